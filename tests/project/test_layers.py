@@ -1,0 +1,99 @@
+"""A module imports only from modules above it."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+# From the top down; a package counts as one module.
+LAYERS = [
+    "errors",
+    "version",
+    "geometry",
+    "paths",
+    "state",
+    "catalog",
+    "robot",
+    "tasks",
+    "contacts",
+    "limits",
+    "bodies",
+    "script",
+    "qp",
+    "rows",
+    "kinematics",
+    "compiled",
+    "stack",
+    "diagnose",
+    "backends",
+    "tick",
+    "bundle",
+    "checks",
+    "plots",
+    "view",
+    "planner",
+    "taskfile",
+    "printing",
+    "cli",
+]
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "wbplan"
+FILES = sorted(p for p in PACKAGE.rglob("*.py") if "_data" not in p.parts)
+
+
+def layer_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports_of(path: Path, source: str | None = None) -> list[tuple[int, str]]:
+    """(line, module of wbplan) for every import anywhere in a file; "" for the package itself."""
+    found = []
+    for node in ast.walk(ast.parse(source if source is not None else path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [a.name for a in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: relative import"
+            if node.module == "wbplan":
+                names = [f"wbplan.{a.name}" if a.name in LAYERS else "wbplan" for a in node.names]
+            else:
+                names = [node.module or ""]
+        else:
+            continue
+        parts = [name.split(".") for name in names if name.split(".")[0] == "wbplan"]
+        found += [(node.lineno, p[1] if len(p) > 1 else "") for p in parts]
+    return found
+
+
+def faults(path: Path, source: str | None = None) -> list[str]:
+    own = LAYERS.index(layer_of(path))
+    return [
+        f"{path.relative_to(ROOT)}:{line}: imports wbplan{'.' if name else ''}{name}"
+        for line, name in imports_of(path, source)
+        if name != LAYERS[own] and (name not in LAYERS or LAYERS.index(name) >= own)
+    ]
+
+
+def test_every_module_has_its_place() -> None:
+    assert sorted({layer_of(p) for p in FILES} - {"__init__", "__main__"}) == sorted(LAYERS)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_only_from_above(path: Path) -> None:
+    if layer_of(path) in ("__init__", "__main__"):
+        pytest.skip("sees everything")
+    assert not faults(path)
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["import wbplan", "from wbplan import cli", "def f():\n    from wbplan.cli import main", "from wbplan import Robot"],
+)
+def test_an_import_from_below_is_seen(source: str) -> None:
+    assert faults(PACKAGE / "geometry.py", source)
+
+
+def test_tasks_use_the_public_names_only() -> None:
+    for path in sorted((ROOT / "tasks").glob("*.py")):
+        assert [name for _, name in imports_of(path) if name] == [], path

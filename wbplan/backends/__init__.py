@@ -1,0 +1,24 @@
+"""Solvers behind one protocol: `proxqp` (the default, own stack) and `placo` (all in C++)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from wbplan.backends.placo import PlacoBackend
+from wbplan.backends.proxqp import ProxqpBackend
+from wbplan.errors import SpecError
+from wbplan.qp import Backend
+from wbplan.stack import Stack
+
+BACKENDS: dict[str, Callable[[Stack], Backend]] = {"proxqp": ProxqpBackend, "placo": PlacoBackend}
+
+
+def make_backend(name: str, stack: Stack) -> Backend:
+    """The backend of that name for one phase.
+
+    Raises:
+        SpecError: there is no such backend, or it cannot express the phase.
+    """
+    if name not in BACKENDS:
+        raise SpecError(f"backend '{name}' does not exist; there are: {', '.join(BACKENDS)}")
+    return BACKENDS[name](stack)

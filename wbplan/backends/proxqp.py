@@ -1,0 +1,79 @@
+"""ProxQP on the stack's own matrices: the default backend.
+
+It accepts redundant hard rows, which closed loops make, and its multipliers say what holds the robot back.
+"""
+
+from __future__ import annotations
+
+from typing import final
+
+import numpy as np
+import proxsuite
+
+from wbplan.diagnose import solve_error
+from wbplan.qp import Solution
+from wbplan.stack import Stack
+
+#: Largest residual [m or rad] of a hard row or bound that counts as kept.
+TOLERANCE = 1e-7
+
+
+@final
+class ProxqpBackend:
+    """See the module. The solver object is kept and updated; each solve starts from the last one."""
+
+    name = "proxqp"
+
+    def __init__(self, stack: Stack) -> None:
+        self._stack = stack
+        self._qp = self._new_solver()
+        self._started = False
+        self._unbounded = np.full(len(stack.d), -1e20)
+
+    def _new_solver(self) -> proxsuite.proxqp.dense.QP:
+        stack = self._stack
+        qp = proxsuite.proxqp.dense.QP(len(stack.g), len(stack.b), len(stack.d), True)
+        qp.settings.eps_abs = 1e-9
+        qp.settings.eps_rel = 0.0
+        qp.settings.max_iter = 200
+        qp.settings.check_duality_gap = False
+        # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
+        qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+        return qp
+
+    def solve(self) -> Solution:
+        """See `Backend.solve`."""
+        s = self._stack
+        s.assemble()
+        if not (self._run() or self._retry()):
+            raise solve_error(s, "the QP has no solution")
+        results, edges = self._qp.results, len(s.d)
+        x = np.clip(results.x, s.lower, s.upper)
+        step = np.zeros(s.phase.model.nv)
+        step[s.phase.free] = x
+        step[s.driven] = s.driven_step
+        return Solution(step, results.y, results.z[:edges], results.z[edges:])
+
+    def _run(self) -> bool:
+        s, qp = self._stack, self._qp
+        if self._started:
+            qp.update(s.H, s.g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
+        else:
+            qp.init(s.H, s.g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
+            self._started = True
+        qp.solve()
+        return self._good()
+
+    def _retry(self) -> bool:
+        """Once more from nothing, with patience: a warm start may be a bad one."""
+        self._qp, self._started = self._new_solver(), False
+        self._qp.settings.max_iter = 2000
+        return self._run()
+
+    def _good(self) -> bool:
+        s, x = self._stack, self._qp.results.x
+        if not np.isfinite(x).all():
+            return False
+        residual = np.abs(s.A @ x - s.b).max(initial=0.0)
+        over = (s.C @ x - s.d).max(initial=0.0)
+        return bool(residual <= TOLERANCE and over <= TOLERANCE)

@@ -1,0 +1,142 @@
+"""Promises about samples, joints and the base."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wbplan.bundle import Bundle
+from wbplan.checks.replay import EDGE, Array, Replay
+from wbplan.checks.report import Row, Tolerances, Worst
+
+BASE_SPEED = 3.0  #: [m/s], a base that is faster has jumped: `q` is to be continuous
+BASE_TURNING = 6.0  #: [rad/s]
+
+
+def sampling_rows(bundle: Bundle) -> list[Row]:
+    """Rows that everything else rests on: values are finite, time increases."""
+    motion = bundle.trajectory
+    samples = np.arange(len(motion), dtype=np.float64)
+    names = [bundle.phases[i]["name"] for i in motion.phase]
+    finite = Worst("values finite", "values")
+    for key in ("time", "q", "v", "com", *(f"body_{name}" for name in motion.bodies)):
+        array = motion.bodies[key[5:]] if key.startswith("body_") else getattr(motion, key)
+        broken = np.count_nonzero(~np.isfinite(array.reshape(len(motion), -1)), axis=1)
+        # Time itself may be what is broken: say the sample instead.
+        finite.see(broken, 0.0, motion.time, names, [f"{key}, sample {int(samples[np.argmax(broken)])}"])
+    increases = Worst("time increases", "s", at_least=True)
+    increases.see(np.diff(motion.time), EDGE, motion.time[:-1], names, ["step"])
+    return [*finite.rows(), *increases.rows()]
+
+
+def rows(replay: Replay, bounds: Tolerances) -> list[Row]:
+    """Sampling at `dt`, unit quaternions, joint limits, continuity, and `v` as recorded."""
+    del bounds
+    return [
+        *_sampling(replay),
+        *_unit_length(replay),
+        *_positions(replay),
+        *_speeds(replay),
+        *_accelerations(replay),
+        *_continuity(replay),
+        *_velocity_record(replay),
+    ]
+
+
+def _sampling(replay: Replay) -> list[Row]:
+    time, dt = replay.record.time, float(replay.plan["dt"])
+    spacing = Worst("sample spacing", "s")
+    spacing.see(np.abs(np.diff(time) - dt), EDGE, time[:-1], replay.phase_names, ["off dt"])
+    edges = Worst("phase edges sampled", "s")
+    for window in replay.windows:
+        for key in ("start", "end"):
+            edge = float(window.promises[key])
+            edges.see([np.min(np.abs(time - edge))], EDGE, [edge], window.name, [key])
+    return [*spacing.rows(), *edges.rows()]
+
+
+def _unit_length(replay: Replay) -> list[Row]:
+    q, time, model = replay.record.q, replay.record.time, replay.model
+    length = Worst("unit quaternion", "")
+    length.see(np.abs(np.linalg.norm(q[:, 3:7], axis=1) - 1.0), 1e-6, time, replay.phase_names, ["base"])
+    for name, joint in _joints(model):
+        if joint.nq == 2:  # a continuous joint, stored as its cosine and sine
+            off = np.abs(np.linalg.norm(q[:, joint.idx_q : joint.idx_q + 2], axis=1) - 1.0)
+            length.see(off, 1e-6, time, replay.phase_names, [name])
+    return length.rows()
+
+
+def _positions(replay: Replay) -> list[Row]:
+    """max(lower - q, q - upper) <= 0."""
+    model = replay.model
+    limited = [(name, joint.idx_q) for name, joint in _joints(model) if joint.nq == 1]
+    columns = [index for _, index in limited]
+    values = replay.record.q[:, columns]
+    excess = np.maximum(
+        model.lowerPositionLimit[columns] - values, values - model.upperPositionLimit[columns]
+    )
+    worst = Worst("joint positions", "rad or m beyond limit", slack=1e-9)
+    worst.see(excess, 0.0, replay.record.time, replay.phase_names, [name for name, _ in limited])
+    return worst.rows()
+
+
+def _speeds(replay: Replay) -> list[Row]:
+    """|q[k+1] - q[k]| / (t[k+1] - t[k]) - speed limit <= 0."""
+    excess = np.abs(replay.step[:, 6:]) - replay.model.velocityLimit[6:]
+    worst = Worst("joint speeds", "rad/s or m/s beyond limit", slack=1e-6)
+    worst.see(excess, 0.0, replay.record.time[:-1], replay.phase_names, replay.record.joint_names)
+    return worst.rows()
+
+
+def _accelerations(replay: Replay) -> list[Row]:
+    """The change of velocity from one step to the next, over the step's duration."""
+    if "joint_acceleration" not in replay.plan:
+        return []
+    limit = np.array(replay.plan["joint_acceleration"], dtype=np.float64)
+    duration = np.diff(replay.record.time)[1:, None]
+    excess = np.abs(np.diff(replay.step[:, 6:], axis=0)) / duration - limit
+    worst = Worst("joint accelerations", "rad/s2 or m/s2 beyond limit", slack=1e-6)
+    worst.see(excess, 0.0, replay.record.time[1:-1], replay.phase_names[1:], replay.record.joint_names)
+    return worst.rows()
+
+
+def _continuity(replay: Replay) -> list[Row]:
+    """The base does not jump; a quaternion that changes its sign is a jump of `q` as well."""
+    q, time = replay.record.q, replay.record.time
+    duration = np.diff(time)
+    speed = Worst("base speed", "m/s")
+    speed.see(
+        _length(np.diff(q[:, :3], axis=0)) / duration, BASE_SPEED, time[:-1], replay.phase_names, ["base"]
+    )
+    turning = Worst("base turning", "rad/s")  # |dQ/dt| = |omega| / 2
+    rate = 2.0 * _length(np.diff(q[:, 3:7], axis=0)) / duration
+    turning.see(rate, BASE_TURNING, time[:-1], replay.phase_names, ["base"])
+    return [*speed.rows(), *turning.rows()]
+
+
+def _velocity_record(replay: Replay) -> list[Row]:
+    """The recorded v[k] leads from q[k] to q[k+1]; the last one is zero."""
+    expected = np.vstack([replay.step, np.zeros((1, replay.model.nv))])
+    names = [
+        "base x",
+        "base y",
+        "base z",
+        "base turn x",
+        "base turn y",
+        "base turn z",
+        *replay.record.joint_names,
+    ]
+    worst = Worst("v agrees with q", "rad/s or m/s")
+    worst.see(np.abs(replay.record.v - expected), 1e-6, replay.record.time, replay.phase_names, names)
+    return worst.rows()
+
+
+def _joints(model: Any) -> list[tuple[str, Any]]:
+    """Name and joint model of every joint after the free flyer."""
+    return [(model.names[i], model.joints[i]) for i in range(2, model.njoints)]
+
+
+def _length(rows_: Array) -> Array:
+    length: Array = np.linalg.norm(rows_, axis=1)
+    return length

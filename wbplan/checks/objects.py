@@ -1,0 +1,78 @@
+"""Promises about closed loops and about objects: carried ones follow their holder, others stay put."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from wbplan.checks.replay import Poses, Replay, Window
+from wbplan.checks.report import Row, Tolerances, Worst
+
+RECORD = 1e-6  #: [m] and [rad], how well a carried object's recorded pose follows from its holder's
+
+
+def rows(replay: Replay, bounds: Tolerances) -> list[Row]:
+    """Closures, objects, and promises that nothing here can check (which count as broken)."""
+    return [*_closures(replay, bounds), *_objects(replay, bounds), *_unknown(replay)]
+
+
+def _closures(replay: Replay, bounds: Tolerances) -> list[Row]:
+    """T_a_b against what it was when the phase began, and when the loop was closed."""
+    gap, turn = Worst("closure gap", "m"), Worst("closure turn", "rad")
+    closed: dict[tuple[str, str], Poses] = {}
+    for window in replay.windows:
+        pairs = [(loop["frame_a"], loop["frame_b"]) for loop in window.promises["closures"]]
+        paths = {(a, b): replay.frames[b].seen_from(replay.frames[a])[window.samples] for a, b in pairs}
+        closed = {pair: closed.get(pair, path[:1]) for pair, path in paths.items()}
+        times = replay.times(window.samples)
+        for (a, b), path in paths.items():
+            for anchor in (path[:1], closed[a, b]):
+                gap.see(path.distance(anchor), bounds.closure, times, window.name, [f"{a} - {b}"])
+                turn.see(path.turn(anchor), bounds.rotation, times, window.name, [f"{a} - {b}"])
+    return [*gap.rows(), *turn.rows()]
+
+
+def _objects(replay: Replay, bounds: Tolerances) -> list[Row]:
+    """Recorded poses of objects against T_world_frame T_frame_object, or against where they were left.
+
+    At a phase's edges an object is where both phases say: it does not jump when it is taken or let go.
+    """
+    place, turn = Worst("object place", "m"), Worst("object turn", "rad")
+    for name, recorded in replay.record.bodies.items():
+        path = Poses.of(recorded)
+        left = path[:1]
+        for window in replay.windows:
+            samples = window.samples
+            item = _carried(window, name)
+            expected = left if item is None else replay.held_pose(item, samples)
+            own = (item is not None) & (replay.record.phase[samples] == window.index)
+            times = replay.times(samples)
+            for worst, off, bound in (
+                (place, path[samples].distance(expected), bounds.closure),
+                (turn, path[samples].turn(expected), bounds.rotation),
+            ):
+                worst.see(off, np.where(own, RECORD, bound)[:, None], times, window.name, [name])
+            left = expected[-1:]
+    return [*place.rows(), *turn.rows()]
+
+
+def _carried(window: Window, name: str) -> Mapping[str, Any] | None:
+    for item in window.promises["carried"]:
+        if item["name"] == name:
+            found: Mapping[str, Any] = item
+            return found
+    return None
+
+
+def _unknown(replay: Replay) -> list[Row]:
+    """A promised clearance: it must not pass because nobody looked."""
+    worst = Worst("clearance", "m", at_least=True)
+    for window in replay.windows:
+        if "clearance" in window.promises:
+            at = replay.times(window.samples[:1])
+            worst.see(
+                [np.nan], window.promises["clearance"], at, window.name, ["no check for it in this version"]
+            )
+    return worst.rows()

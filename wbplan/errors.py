@@ -1,0 +1,91 @@
+"""Every error that a user can cause, under one root.
+
+A message names what was at fault, what was found, what was expected, and what to do about it; the
+attributes carry the same as data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class WbplanError(Exception):
+    """Root of all errors raised by wbplan."""
+
+
+class ModelError(WbplanError):
+    """A robot's description (URDF, SRDF, meshes) is unusable.
+
+    Attributes:
+        problems: every problem found, each naming its element.
+    """
+
+    def __init__(self, message: str, problems: Sequence[str] = ()) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join([message, *(f"  - {p}" for p in self.problems)]))
+
+
+class SpecError(WbplanError):
+    """A task, phase, script or argument is not what it has to be."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """How far one hard row group has to give way for the others to hold.
+
+    Attributes:
+        name: the task, contact or limit.
+        amount: least relaxation over the next tick, in `unit`.
+        unit: "m" or "rad".
+    """
+
+    name: str
+    amount: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.name} by {self.amount:.3g} {self.unit}"
+
+
+class SolveError(WbplanError):
+    """No step exists that keeps every hard promise; nothing was integrated.
+
+    Attributes:
+        clashes: the hard rows that contradict each other (or the limits), and by how much.
+        limits: names of the limits that stand against them.
+    """
+
+    def __init__(
+        self, message: str, clashes: Sequence[Relaxation] = (), limits: Sequence[str] = ()
+    ) -> None:
+        self.clashes = tuple(clashes)
+        self.limits = tuple(limits)
+        super().__init__(message)
+
+
+class CheckFailed(WbplanError):
+    """A plan breaks a promise.
+
+    Attributes:
+        broken: names of the broken promises.
+    """
+
+    def __init__(self, message: str, broken: Sequence[str] = ()) -> None:
+        self.broken = tuple(broken)
+        super().__init__(message)
+
+
+class BundleError(WbplanError):
+    """A plan bundle cannot be read or written."""
+
+
+class ViewError(WbplanError):
+    """The viewer cannot start or be reached."""
+
+
+def listing(names: Sequence[str], most: int = 12) -> str:
+    """Names for a message: all where they are few, else the first ones and how many more there are."""
+    shown = ", ".join(sorted(names)[:most]) or "none"
+    more = len(names) - most
+    return f"{shown} and {more} more" if more > 0 else shown

@@ -1,0 +1,53 @@
+"""Inequalities that a phase keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from wbplan.errors import SpecError
+
+
+@final
+@dataclass(frozen=True)
+class JointLimits:
+    """Joint positions and speeds within the URDF's limits, as one box on the tick's step.
+
+    max(-speed dt, min(lower - q, speed dt)) <= dq <= min(speed dt, max(upper - q, -speed dt)):
+    the position bounds are clipped to what the speed bound lets one tick reach, so that a start outside
+    the limits comes back inside instead of being infeasible.
+
+    Args:
+        speed: fraction of the URDF's speed limits that may be used, in (0, 1].
+    """
+
+    speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.speed <= 1.0:
+            raise SpecError(f"JointLimits.speed: expected a fraction in (0, 1], got {self.speed}")
+
+
+@final
+@dataclass(frozen=True)
+class SupportPolygon:
+    """The CoM of robot and carried bodies stays `margin` [m] inside the hull of the phase's contacts.
+
+    N (c + J dq) <= d - margin, with N the unit normals of the edges, in the horizontal plane.
+    A CoM that starts outside moves inward at `recovery_speed`, and never outward, until it is inside.
+
+    Args:
+        margin: [m]; negative lets the CoM leave the polygon by that much.
+        recovery_speed: [m/s].
+    """
+
+    margin: float = 0.02
+    recovery_speed: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.margin):
+            raise SpecError(f"SupportPolygon.margin: expected metres, got {self.margin}")
+        if not (np.isfinite(self.recovery_speed) and self.recovery_speed > 0.0):
+            raise SpecError(f"SupportPolygon.recovery_speed: expected a positive speed [m/s], got {self.recovery_speed}")

@@ -1,0 +1,171 @@
+"""A script run from start to end: phase after phase, tick after tick, into a plan."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbplan.bundle import Bundle, Trajectory
+from wbplan.checks import CheckReport, check
+from wbplan.compiled import CompiledPhase
+from wbplan.errors import SolveError, SpecError
+from wbplan.recorder import Recorder
+from wbplan.robot import Robot
+from wbplan.script import Phase, Script
+from wbplan.state import State
+from wbplan.tick import Loop
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A planned script: the robot it was planned for, and its bundle.
+
+    Attributes:
+        robot: the robot.
+        bundle: everything that is saved, as data.
+    """
+
+    robot: Robot
+    bundle: Bundle
+
+    @property
+    def report(self) -> Mapping[str, Any]:
+        """Planning and motion time [s], ticks, their median and 99th percentile [us], worst errors, warnings."""
+        report: Mapping[str, Any] = self.bundle.plan["report"]
+        return report
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Time, q, v and the rest, as arrays."""
+        return self.bundle.trajectory
+
+    def check(self) -> CheckReport:
+        """Every promise recomputed from q, the URDF and the phases' specifications."""
+        return check(self.bundle)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the bundle, with its animation and plots, whole or not at all.
+
+        Raises:
+            BundleError: the folder cannot be written.
+        """
+        from wbplan import plots
+        from wbplan.view import write_html
+
+        return self.bundle.write(
+            Path(folder),
+            extras={
+                "scene.html": lambda path: write_html(self.bundle, path),
+                "plots.png": lambda path: plots.save(self.bundle, path),
+            },
+        )
+
+    def view(self, host: str = "127.0.0.1", port: int | None = None) -> Any:
+        """Serve the animation in Meshcat; returns the server, with `.url` and `.stop()`."""
+        from wbplan.view import serve
+
+        return serve(self.bundle, host=host, port=port)
+
+
+def plan(
+    robot: Robot,
+    script: Script | Phase,
+    start: State | str | Array = "stand",
+    dt: float = 0.01,
+    backend: str = "proxqp",
+    *,
+    task: str = "script",
+    parameters: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+    observe: Callable[[Loop, float], None] | None = None,
+) -> Plan:
+    """Plan a script.
+
+    Args:
+        robot: the robot.
+        script: phases, or one phase.
+        start: a state, the name of a pose, or (nq,).
+        dt: length of a tick [s].
+        backend: 'proxqp' or 'placo'.
+        task: name for the bundle.
+        parameters: what the script was made with, for the bundle.
+        progress: called with the fraction done and the phase's name, now and then.
+        observe: called with the loop and the time [s] at every sample, as a live view wants.
+
+    Raises:
+        SpecError: the script does not fit the robot, or a phase promises what its start does not hold.
+        SolveError: a tick has no step that keeps every hard promise.
+    """
+    script = script if isinstance(script, Script) else Script(script)
+    state = start if isinstance(start, State) else robot.state(start)
+    started = time.perf_counter()
+    recorder = Recorder(robot, script, dt)
+    placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
+    q, roles = np.array(state.q), None
+    _inside_limits(robot, q)
+    elapsed = 0.0
+    for index, phase in enumerate(script.phases):
+        loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles)
+        _promises_hold(loop, phase)
+        recorder.begin(index, loop, placed, elapsed)
+        ticks = max(1, int(np.ceil(phase.duration / dt - 1e-9)))
+        for k in range(ticks):
+            if observe is not None:
+                observe(loop, elapsed + k * dt)
+            try:
+                tick = loop.step()
+            except SolveError as error:
+                where = f"at {elapsed + k * dt:.2f} s of the plan, {k * dt:.2f} s into"
+                raise SolveError(f"{where} {error}", error.clashes, error.limits) from None
+            recorder.record(loop, tick)
+            if progress is not None and k % 20 == 0:
+                progress((elapsed + k * dt) / script.duration, phase.name)
+        elapsed += ticks * dt
+        q, roles = loop.q, loop.compiled.roles
+        placed.update(_where_held(loop.compiled, q))
+        recorder.end(index, loop, elapsed)
+    if progress is not None:
+        progress(1.0, "done")
+    bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
+    return Plan(robot, bundle)
+
+
+def _inside_limits(robot: Robot, q: Array) -> None:
+    """The start must hold the joint limits: a plan promises them at every sample."""
+    low, high = robot.model.lowerPositionLimit[7:], robot.model.upperPositionLimit[7:]
+    bad = [
+        f"{name} is {value:.4f}, limits {lo:.4f} to {hi:.4f}"
+        for name, value, lo, hi in zip(robot.joint_names, q[7:], low, high, strict=True)
+        if not lo - 1e-9 <= value <= hi + 1e-9
+    ]
+    if bad:
+        raise SpecError(f"start: joints outside their limits: {'; '.join(bad)}")
+
+
+def _promises_hold(loop: Loop, phase: Phase) -> None:
+    """A phase's margin holds from its first sample on."""
+    if phase.margin is not None and loop.margin < phase.margin:
+        com = loop.stack.kinematics.com
+        raise SpecError(
+            f"phase '{phase.name}' promises a stability margin of {phase.margin:.4f} m but starts with "
+            f"{loop.margin:.4f} m (CoM x={com[0]:.4f}, y={com[1]:.4f} m over {len(phase.contacts)} contacts); "
+            f"move the CoM inside before it, or promise less"
+        )
+
+
+def _where_held(compiled: CompiledPhase, q: Array) -> dict[str, Any]:
+    """World poses of the carried bodies at `q`."""
+    state = State(compiled.model, q) if compiled.held else None
+    return {h.body.name: state.pose(h.body.name) for h in compiled.held} if state is not None else {}
+
+

@@ -1,0 +1,43 @@
+"""What a backend answers with, and why it could not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """A step and what held it back.
+
+    Attributes:
+        step: (nv,) tangent step dq over one tick [m, rad].
+        hard: multipliers (m,) of the hard rows; None where the backend gives none.
+        edges: multipliers (E,) of the support polygon's edges, 0 or more.
+        box: multipliers (nf,) of the box, positive at an upper bound.
+    """
+
+    step: Array
+    hard: Array | None = None
+    edges: Array | None = None
+    box: Array | None = None
+
+
+class Backend(Protocol):
+    """Solves one phase's ticks. Made once per phase; `solve` once per tick."""
+
+    name: str
+
+    def solve(self) -> Solution:
+        """The step towards the targets that the stack was advanced to.
+
+        Raises:
+            SolveError: no step keeps every hard row and limit, or the solver gave none that is finite.
+        """
+        ...

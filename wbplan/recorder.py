@@ -1,0 +1,183 @@
+"""What a plan was, sample by sample, collected while it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, final
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbplan.bundle import SCHEMA, Bundle, Trajectory
+from wbplan.compiled import WORLD
+from wbplan.robot import Robot
+from wbplan.script import Script
+from wbplan.tick import Loop, Tick
+from wbplan.version import VERSION
+
+Array = NDArray[np.float64]
+
+#: `margin` in plan.json of a phase that promises none.
+NO_MARGIN = -1e9
+
+
+@final
+class Recorder:
+    """Collects samples; the sample at an edge belongs to the phase that starts there, the last to the last."""
+
+    def __init__(self, robot: Robot, script: Script, dt: float) -> None:
+        self._robot, self._script, self._dt = robot, script, dt
+        self._q: list[Array] = []
+        self._v: list[Array] = []
+        self._com: list[Array] = []
+        self._margin: list[float] = []
+        self._phase: list[int] = []
+        self._errors: list[dict[str, float]] = []
+        self._targets: list[dict[str, Array]] = []
+        self._bodies: list[dict[str, Array]] = []
+        self._microseconds: list[float] = []
+        self._warnings: list[str] = []
+        self._phases: list[dict[str, Any]] = []
+        self._placed: Mapping[str, Any] = {}
+        self._start = 0.0
+
+    def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
+        """A phase starts: what was the last sample of the one before becomes the first of this one."""
+        self._placed = {name: pin.SE3ToXYZQUAT(pose) for name, pose in placed.items()}
+        self._start = elapsed
+        for samples in (self._q, self._com, self._margin, self._phase, self._errors, self._targets, self._bodies):
+            if samples:
+                samples.pop()  # type: ignore[attr-defined]
+        self._sample(index, loop)
+        self._index = index
+
+    def record(self, loop: Loop, tick: Tick) -> None:
+        """One tick was made."""
+        self._v.append(tick.v)
+        self._microseconds.append(tick.microseconds)
+        if tick.warning:
+            self._warnings.append(f"{loop.compiled.phase.name}: {tick.warning}")
+        self._sample(self._index, loop)
+
+    def _sample(self, index: int, loop: Loop) -> None:
+        stack = loop.stack
+        self._q.append(loop.q)
+        self._com.append(stack.kinematics.com.copy())
+        self._margin.append(stack.margin)
+        self._phase.append(index)
+        self._errors.append(stack.errors())
+        self._targets.append(_targets(loop))
+        self._bodies.append({**self._placed, **_held(loop)})
+
+    def end(self, index: int, loop: Loop, elapsed: float) -> None:
+        """A phase is over: its entry in plan.json."""
+        phase = loop.compiled.phase
+        first = self._phase.index(index)
+        errors = self._errors[first:]
+        tasks = []
+        for task in (*phase.hard, *phase.soft):
+            worst = {
+                part: max((e[f"{task.label}.{part}"] for e in errors if f"{task.label}.{part}" in e), default=None)
+                for part in ("position", "orientation", "joints")
+            }
+            tasks.append({"name": task.label, "hard": task in phase.hard, **worst})
+        self._phases.append(
+            {
+                "name": phase.name,
+                "start": self._start,
+                "end": elapsed,
+                "contacts": [
+                    {"frame": c.frame, "friction": c.friction, "normal": list(c.normal)} for c in phase.contacts
+                ],
+                "margin": NO_MARGIN if phase.margin is None else phase.margin,
+                "closures": [{"frame_a": a, "frame_b": b} for a, b in phase.closures],
+                "carried": [
+                    {
+                        "name": h.body.name,
+                        "frame": h.holder,
+                        "pose": [float(x) for x in pin.SE3ToXYZQUAT(h.T_holder_body)],
+                        "mass": h.body.mass,
+                        "com": list(h.body.com),
+                    }
+                    for h in loop.compiled.held
+                ],
+                "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
+                "tasks": tasks,
+            }
+        )
+
+    def bundle(self, task: str, backend: str, parameters: dict[str, Any], seconds: float) -> Bundle:
+        """Everything recorded, as a bundle."""
+        n = len(self._q)
+        margin = np.array(self._margin)
+        trajectory = Trajectory(
+            time=np.arange(n) * self._dt,
+            q=np.array(self._q),
+            v=np.array([*self._v, np.zeros(self._robot.model.nv)]),
+            phase=np.array(self._phase, dtype=np.int64),
+            com=np.array(self._com),
+            margin=np.where(np.isfinite(margin), margin, np.nan),
+            joint_names=tuple(self._robot.joint_names),
+            bodies=_columns(self._bodies, 7),
+            targets=_columns(self._targets, 7),
+            errors={name: column[:, 0] for name, column in _columns(self._errors, 1).items()},
+        )
+        microseconds = np.array(self._microseconds)
+        report = {
+            "seconds_planning": seconds,
+            "seconds_motion": float(trajectory.time[-1]),
+            "ticks": len(microseconds),
+            "median_us": float(np.median(microseconds)),
+            "p99_us": float(np.percentile(microseconds, 99)),
+            "worst": {name: float(np.nanmax(column)) for name, column in trajectory.errors.items()},
+            "warnings": list(dict.fromkeys(self._warnings)),
+        }
+        plan = {
+            "schema": SCHEMA,
+            "wbplan": VERSION,
+            "task": task,
+            "robot": self._robot.name,
+            "backend": backend,
+            "dt": self._dt,
+            "parameters": parameters,
+            "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
+            "phases": self._phases,
+            "report": report,
+        }
+        return Bundle(plan, trajectory, self._robot.urdf_text)
+
+
+def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:
+    """Samples that name what they hold -> one array a name, nan where a sample does not have it."""
+    names = dict.fromkeys(name for sample in samples for name in sample)
+    columns = {name: np.full((len(samples), width), np.nan) for name in names}
+    for k, sample in enumerate(samples):
+        for name, value in sample.items():
+            columns[name][k] = value
+    return columns
+
+
+def _targets(loop: Loop) -> dict[str, Array]:
+    """World poses asked for now, by task; a point's orientation is the world's."""
+    found = {}
+    for target in loop.compiled.frame_targets:
+        if target.root != WORLD or target.label.startswith("contact("):
+            continue
+        value = target.path.at(loop.t)
+        if not isinstance(value, pin.SE3):
+            if np.shape(value) != (3,):
+                continue
+            value = pin.SE3(np.eye(3), np.asarray(value))
+        found[target.label] = pin.SE3ToXYZQUAT(value)
+    return found
+
+
+def _held(loop: Loop) -> dict[str, Array]:
+    compiled = loop.compiled
+    if not compiled.held:
+        return {}
+    oMf = loop.stack.kinematics.data.oMf
+    return {h.body.name: pin.SE3ToXYZQUAT(oMf[h.frame]) for h in compiled.held}
+
+

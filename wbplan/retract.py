@@ -1,0 +1,73 @@
+"""Back onto the contacts and loops after a step: the least correction that the rows' curvature asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import final
+
+import numpy as np
+import pinocchio as pin
+import proxsuite
+from numpy.typing import NDArray
+
+from wbplan.stack import Stack
+
+Array = NDArray[np.float64]
+
+#: Drift of a hard row [m or rad] that is left to the next tick.
+DRIFT = 2e-6
+MOST = 4
+
+
+@final
+class Retraction:
+    """Newton steps of least norm onto the hard rows, within the tick's joint box and the polygon."""
+
+    def __init__(self, stack: Stack) -> None:
+        self._stack = stack
+
+    def correct(self, q: Array, new: Array, kept: Callable[[], bool]) -> Array:
+        """Correct `new`, which a step from `q` led to, at most a few times; the stack then measures the result.
+
+        Returns:
+            The last configuration tried: the caller judges it.
+        """
+        stack = self._stack
+        model, free = stack.phase.model, stack.phase.free
+        lower, upper = stack.lower.copy(), stack.upper.copy()
+        for _ in range(MOST):
+            taken = np.zeros(len(free))
+            taken[6:] = new[7:][free[6:] - 6] - q[7:][free[6:] - 6]
+            stack.linearise()
+            x = self._solve(lower - taken, upper - taken)
+            if x is None:
+                return new
+            total = np.zeros(model.nv)
+            total[free] = x
+            candidate = pin.integrate(model, new, total)
+            candidate[7:] = np.clip(candidate[7:], *self._reachable(q, lower, upper))
+            stack.measure(candidate)
+            new = candidate
+            if kept():
+                break
+        return new
+
+    def _reachable(self, q: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+        low, high = np.full(len(q) - 7, -np.inf), np.full(len(q) - 7, np.inf)
+        joints = self._stack.phase.free[6:] - 6
+        low[joints], high[joints] = q[7 + joints] + lower[6:], q[7 + joints] + upper[6:]
+        return low, high
+
+    def _solve(self, lower: Array, upper: Array) -> Array | None:
+        stack = self._stack
+        n, edges = len(stack.g), len(stack.d)
+        qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
+        qp.settings.eps_abs = 1e-9
+        qp.settings.primal_infeasibility_solving = True
+        qp.init(
+            np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, np.full(edges, -1e20), stack.d,
+            np.minimum(lower, 0.0), np.maximum(upper, 0.0),
+        )
+        qp.solve()
+        x = np.array(qp.results.x)
+        return x if np.isfinite(x).all() else None

@@ -1,0 +1,170 @@
+"""A phase is one set of contacts, tasks and limits for a time; a script is a list of phases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, final
+
+import numpy as np
+
+from wbplan.bodies import Body, Carried
+from wbplan.contacts import Contact
+from wbplan.errors import SpecError, listing
+from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.paths import AsIs, Path, as_path
+from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task
+
+Limit = JointLimits | SupportPolygon
+
+
+def _tuple_of(items: Iterable[Any], kinds: type | tuple[type, ...], what: str) -> tuple[Any, ...]:
+    if isinstance(items, str) or not isinstance(items, Iterable):
+        raise SpecError(f"{what}: expected a list, got {items!r}")
+    result = tuple(items)
+    names = " or ".join(k.__name__ for k in (kinds if isinstance(kinds, tuple) else (kinds,)))
+    for item in result:
+        if not isinstance(item, kinds):
+            raise SpecError(f"{what}: expected {names}, got {item!r}")
+    return result
+
+
+def _unique(names: Sequence[str], what: str) -> None:
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise SpecError(f"{what}: named more than once: {', '.join(twice)}")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """What holds, what is asked and what limits it, for `duration` seconds.
+
+    Args:
+        name: for reports.
+        contacts: feet that stay (hard) and span the support polygon.
+        carried: bodies held by frames of the robot; each is a frame that tasks may name.
+        hard: tasks met in full at every tick.
+        soft: tasks met as well as their weights and everything else allow.
+        limits: inequalities.
+        duration: [s].
+        roles: limb -> role, as the SRDF names them: the joints that the role holds are moved to its values
+            over the phase and are not the QP's; unnamed limbs keep the role they are in.
+        driven: joint -> value or path whose motion is given; such joints are not the QP's.
+        locked: joints that stay as they are; not the QP's.
+
+    Raises:
+        SpecError: a field is not what it has to be.
+    """
+
+    name: str
+    contacts: tuple[Contact, ...] = ()
+    carried: tuple[Carried, ...] = ()
+    hard: tuple[Task, ...] = ()
+    soft: tuple[Task, ...] = ()
+    limits: tuple[Limit, ...] = (JointLimits(),)
+    duration: float = 1.0
+    roles: Mapping[str, str] = field(default_factory=dict)
+    driven: Mapping[str, Any] = field(default_factory=dict)
+    locked: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise SpecError(f"Phase.name: expected a name, got {self.name!r}")
+        put = lambda key, value: object.__setattr__(self, key, value)  # noqa: E731
+        at = f"phase '{self.name}'"
+        put("contacts", _tuple_of(self.contacts, Contact, f"{at}.contacts"))
+        put("carried", _tuple_of(self.carried, Carried, f"{at}.carried"))
+        put("hard", _tuple_of(self.hard, Task, f"{at}.hard"))
+        put("soft", _tuple_of(self.soft, Task, f"{at}.soft"))
+        put("limits", _tuple_of(self.limits, (JointLimits, SupportPolygon), f"{at}.limits"))
+        put("locked", _tuple_of(self.locked, str, f"{at}.locked"))
+        put("roles", MappingProxyType(dict(self.roles)))
+        put("driven", MappingProxyType({j: as_path(p, f"{at}.driven['{j}']") for j, p in self.driven.items()}))
+        if not (np.isfinite(self.duration) and self.duration > 0.0):
+            raise SpecError(f"{at}.duration: expected a positive number of seconds, got {self.duration}")
+        _unique([c.frame for c in self.contacts], f"{at}.contacts")
+        _unique([c.body.name for c in self.carried], f"{at}.carried")
+        _unique([t.label for t in (*self.hard, *self.soft)], f"{at}: tasks (give name=...)")
+        for kind in (JointLimits, SupportPolygon):
+            if sum(isinstance(limit, kind) for limit in self.limits) > 1:
+                raise SpecError(f"{at}.limits: more than one {kind.__name__}")
+        if any(isinstance(t, DampingTask) for t in self.hard):
+            raise SpecError(f"{at}.hard: a damping task forbids all motion; put it in soft")
+
+    @property
+    def margin(self) -> float | None:
+        """The promised stability margin [m]; `None` where the phase promises none."""
+        polygon = self.support
+        return None if polygon is None else polygon.margin
+
+    @property
+    def support(self) -> SupportPolygon | None:
+        """The support polygon limit, if the phase has one."""
+        return next((limit for limit in self.limits if isinstance(limit, SupportPolygon)), None)
+
+    @property
+    def joint_limits(self) -> JointLimits | None:
+        """The joint limits, if the phase has them."""
+        return next((limit for limit in self.limits if isinstance(limit, JointLimits)), None)
+
+    @property
+    def closures(self) -> tuple[tuple[str, str], ...]:
+        """Pairs (root, frame) whose relative pose is held, hard, at one value in all six axes."""
+        return tuple(
+            (t.root, t.frame)
+            for t in self.hard
+            if isinstance(t, RelativePoseTask)
+            and t.path.constant
+            and (t.position_weight > 0).all()
+            and (t.rotation_weight > 0).all()
+        )
+
+    @property
+    def frame_tasks(self) -> tuple[FrameTask, ...]:
+        """Hard, then soft tasks on frames."""
+        return tuple(t for t in (*self.hard, *self.soft) if isinstance(t, FrameTask))
+
+
+@final
+@dataclass(frozen=True, eq=False, init=False)
+class Script:
+    """Phases in order, each starting where the one before ended.
+
+    Args:
+        phases: one or more, their names all different.
+        bodies: objects to show that no phase carries, or that stand somewhere before they are carried.
+    """
+
+    phases: tuple[Phase, ...]
+    bodies: tuple[Body, ...]
+
+    def __init__(self, *phases: Phase | Iterable[Phase], bodies: Iterable[Body] = ()) -> None:
+        flat: list[Phase] = []
+        for item in phases:
+            flat.extend([item] if isinstance(item, Phase) else _tuple_of(item, Phase, "Script"))
+        if not flat:
+            raise SpecError("Script: expected one or more phases, got none")
+        _unique([p.name for p in flat], "Script: phases")
+        known: dict[str, Body] = {}
+        for body in [*_tuple_of(bodies, Body, "Script.bodies"), *(c.body for p in flat for c in p.carried)]:
+            if known.setdefault(body.name, body) != body:
+                raise SpecError(f"Script: two different bodies are named '{body.name}'")
+        object.__setattr__(self, "phases", tuple(flat))
+        object.__setattr__(self, "bodies", tuple(known.values()))
+
+    @property
+    def duration(self) -> float:
+        """Sum of the phases' durations [s]."""
+        return sum(p.duration for p in self.phases)
+
+
+def unknown(kind: str, name: str, valid: Iterable[str]) -> SpecError:
+    """The error for a name that does not exist."""
+    return SpecError(f"{kind} '{name}' does not exist; there are: {listing(list(valid))}")
+
+
+def is_as_is(path: Path) -> bool:
+    """Whether a path is the value at the start of its phase."""
+    return path.constant and isinstance(path.at(0.0), AsIs)

@@ -1,0 +1,333 @@
+"""The phase's rows as one quadratic program in the tick's step dq.
+
+    minimise    1/2 |weight (J dq - rhs)|^2 over soft rows  +  1/2 dq' D dq  -  h' dq
+    subject to  A dq = b              contacts, hard tasks
+                C dq <= d             support polygon
+                lower <= dq <= upper  joint positions and speeds
+
+D and h hold what is diagonal: posture, damping, and a curvature damping. A Gauss-Newton step neglects the
+curvature of a task's error; near a stretched limb the true Hessian then exceeds J'J by up to
+|error| x (lever arm), and full steps chatter about the nearest reachable point for ever. Adding
+weight^2 gain |error| x (1 m, or 1 rad) to the diagonal bounds that curvature from above, so steps settle;
+for a target that is tracked the term vanishes with the error.
+"""
+
+from __future__ import annotations
+
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbplan.compiled import CompiledPhase, JointTarget
+from wbplan.kinematics import Kinematics
+from wbplan.rows import FrameRows
+
+Array = NDArray[np.float64]
+
+#: Always on the diagonal [1/rad^2]: keeps the cost strictly convex where nothing is asked.
+REGULARISATION = 1e-6
+
+#: The tick stays this far [m] inside the promised margin: its row is linear, the CoM's path is not.
+MARGIN_RESERVE = 1e-4
+
+
+@final
+class Posture:
+    """A soft posture task over the free joints.
+
+    Attributes:
+        stiffness: (nf - 6,) squared weights; pull: fraction of the error removed per tick.
+        goal: (nf - 6,) target now; step: how far it moved in the last `advance`.
+    """
+
+    def __init__(self, target: JointTarget, free: NDArray[np.intp], dt: float) -> None:
+        self.label = target.label
+        column = {int(c) - 6: k for k, c in enumerate(free[6:])}
+        self.stiffness = target.weight[free[6:] - 6] ** 2
+        self.pull = 1.0 - float(np.exp(-target.gain * dt))
+        self.goal, self.step = np.zeros(len(column)), np.zeros(len(column))
+        for j, path in target.paths:
+            self.goal[column[j]] = float(path.at(0.0))
+        self._moving = [(column[j], path) for j, path in target.paths if not path.constant]
+
+    def aim(self, t: float) -> None:
+        """Put the target where it is at time `t` [s]."""
+        for k, path in self._moving:
+            self.goal[k], self.step[k] = float(path.at(t)), 0.0
+
+    def advance(self, t: float) -> None:
+        """Move the target on to time `t` [s]."""
+        for k, path in self._moving:
+            value = float(path.at(t))
+            self.step[k], self.goal[k] = value - self.goal[k], value
+
+
+@final
+class Stack:
+    """Matrices of a compiled phase, filled in place.
+
+    `measure` gives errors and margin at the kinematics' current q; `assemble` everything else.
+
+    Attributes:
+        J: (n, nf) rows in the order: hard frames | soft frames | hard CoM and joints | soft CoM.
+        A, b; C, d; H, g; lower, upper: the QP (see the module), lower and upper over the free columns.
+        hard_error: (m,) error of the hard rows at the last `measure`.
+    """
+
+    def __init__(self, phase: CompiledPhase, dt: float) -> None:
+        self.phase, self.dt = phase, dt
+        self.rows = FrameRows(phase.model, phase.frame_targets)
+        self.kinematics = Kinematics(phase.model, self.rows.frames)
+        self._free = phase.free
+        self.driven = np.array([6 + d.joint for d in phase.driven], dtype=np.intp)
+        self._driving = any(not d.path.constant for d in phase.driven)
+        self._mask = np.ascontiguousarray(self.rows.mask[:, phase.free])
+        self._driven_mask = self.rows.mask[:, self.driven]
+        self._coms = [(c, np.flatnonzero(c.weight > 0)) for c in phase.com_targets]
+        self._allocate()
+        self._joint_box()
+        self._diagonal()
+
+    def _allocate(self) -> None:
+        rows, nf = self.rows, len(self._free)
+        hard_com = sum(len(axes) for c, axes in self._coms if c.hard)
+        soft_com = sum(len(axes) for c, axes in self._coms if not c.hard)
+        self._hard_joints = [
+            (j, path, t.label) for t in self.phase.joint_targets if t.hard for j, path in t.paths if t.weight[j] > 0
+        ]
+        self._hard_joint_goal = np.array([float(path.at(0.0)) for _, path, _ in self._hard_joints])
+        self._hard_joint_step = np.zeros(len(self._hard_joints))
+        self.n_hard = rows.hard_rows + hard_com + len(self._hard_joints)
+        n_soft = len(rows.error) - rows.hard_rows + soft_com
+        self.A, self.b = np.zeros((self.n_hard, nf)), np.zeros(self.n_hard)
+        self._soft, self._soft_rhs = np.zeros((n_soft, nf)), np.zeros(n_soft)
+        self._soft_error = np.zeros(n_soft)
+        weights, gains = [rows.weight[rows.hard_rows :]], [rows.gain[rows.hard_rows :]]
+        for c, axes in self._coms:
+            if not c.hard:
+                weights.append(c.weight[axes])
+                gains.append(np.full(len(axes), c.gain))
+        self._weight = np.concatenate(weights)
+        self._pull = 1.0 - np.exp(-np.concatenate(gains) * self.dt)
+        self._curvature = self._weight**2 * self._pull
+        self._weighted = np.zeros((n_soft, nf))
+        self.hard_error = np.zeros(self.n_hard)
+        self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
+        edges = 0 if self.phase.polygon is None else len(self.phase.polygon.offsets)
+        self.C, self.d = np.zeros((edges, nf)), np.zeros(edges)
+        self._J = np.zeros((6, nf))
+        self._W = np.zeros((len(rows.error), nf))
+        self._diag = np.arange(nf) * (nf + 1)
+        self._com_goal = [np.array(c.path.at(0.0), dtype=float) for c, _ in self._coms]
+        self._com_step = [np.zeros(3) for _ in self._coms]
+        self.driven_step = np.zeros(len(self.driven))
+
+    def _joint_box(self) -> None:
+        """Bounds of the free joints; the base (first six columns) has none."""
+        model, free = self.phase.model, self._free
+        limits, nf = self.phase.phase.joint_limits, len(free)
+        joints = free[6:] - 6
+        self._q_index = 7 + joints
+        self._q_lower, self._q_upper = np.full(nf - 6, -np.inf), np.full(nf - 6, np.inf)
+        self._reach = np.full(nf - 6, np.inf)
+        self.lower, self.upper = np.full(nf, -1e20), np.full(nf, 1e20)
+        if limits is not None:
+            self._q_lower = np.array(model.lowerPositionLimit)[self._q_index]
+            self._q_upper = np.array(model.upperPositionLimit)[self._q_index]
+            self._reach = limits.speed * np.array(model.velocityLimit)[free[6:]] * self.dt
+
+    def _diagonal(self) -> None:
+        """What never changes on the diagonal, and the posture tasks' share of it."""
+        self._base_diagonal = np.full(len(self._free), REGULARISATION + self.phase.damping)
+        self._postures = [Posture(t, self._free, self.dt) for t in self.phase.joint_targets if not t.hard]
+        for posture in self._postures:
+            self._base_diagonal[6:] += posture.stiffness
+
+    # -- each tick -----------------------------------------------------------------------------------
+
+    def measure(self, q: Array) -> None:
+        """Kinematics, errors and margin at `q` for the targets as they stand now."""
+        self.kinematics.update(q)
+        self.rows.measure(self.kinematics)
+        k, hard = 0, self.rows.hard_rows
+        self.hard_error[:hard] = self.rows.error[:hard]
+        self._soft_error[: len(self.rows.error) - hard] = self.rows.error[hard:]
+        at_hard, at_soft = hard, len(self.rows.error) - hard
+        for k, (com, axes) in enumerate(self._coms):
+            error = (self._com_goal[k] - self.kinematics.com)[axes]
+            if com.hard:
+                self.hard_error[at_hard : at_hard + len(axes)] = error
+                at_hard += len(axes)
+            else:
+                self._soft_error[at_soft : at_soft + len(axes)] = error
+                at_soft += len(axes)
+        for i, (joint, _, _) in enumerate(self._hard_joints):
+            self.hard_error[at_hard + i] = self._hard_joint_goal[i] - q[7 + joint]
+
+    @property
+    def margin(self) -> float:
+        """Stability margin [m] at the last `measure`; infinite where the phase has no polygon."""
+        polygon = self.phase.polygon
+        if polygon is None:
+            return np.inf
+        return float((polygon.offsets - polygon.normals @ self.kinematics.com[:2]).min())
+
+    @property
+    def live(self) -> bool:
+        """Whether a target may have been set since the last tick."""
+        return self.rows.live or any(c.path.live for c, _ in self._coms)
+
+    def aim(self, t: float) -> None:
+        """Put all targets where they are at time `t` [s]."""
+        self.rows.aim(t, every=True)
+        for k, (com, _) in enumerate(self._coms):
+            self._com_goal[k] = np.array(com.path.at(t), dtype=float)
+        for i, (_, path, _) in enumerate(self._hard_joints):
+            self._hard_joint_goal[i] = float(path.at(t))
+        for posture in self._postures:
+            posture.aim(t)
+
+    def advance(self, t: float) -> None:
+        """Move all targets on to time `t` [s], keeping how far each goes, and so the driven joints."""
+        self.rows.advance(t)
+        for k, (com, _) in enumerate(self._coms):
+            goal = np.array(com.path.at(t), dtype=float)
+            self._com_step[k] = goal - self._com_goal[k]
+            self._com_goal[k] = goal
+        for i, (_, path, _) in enumerate(self._hard_joints):
+            value = float(path.at(t))
+            self._hard_joint_step[i], self._hard_joint_goal[i] = value - self._hard_joint_goal[i], value
+        for posture in self._postures:
+            posture.advance(t)
+        if self._driving:
+            q = self.kinematics.q
+            for i, d in enumerate(self.phase.driven):
+                self.driven_step[i] = float(d.path.at(t)) - q[7 + d.joint]
+
+    def assemble(self) -> None:
+        """Fill H, g, A, b, C, d, lower and upper for the step to the targets that `advance` set."""
+        kin, rows = self.kinematics, self.rows
+        kin.differentiate()
+        rows.write(kin)
+        np.take(kin.jacobian, self._free, axis=1, out=self._J)
+        np.matmul(rows.wrench, self._J, out=self._W)
+        self._W *= self._mask
+        hard, soft = rows.hard_rows, len(rows.error) - rows.hard_rows
+        self.A[:hard] = self._W[:hard]
+        self._soft[:soft] = self._W[hard:]
+        self.b[:] = self.hard_error
+        self.b[:hard] += rows.motion[:hard]
+        np.multiply(self._pull, self._soft_error, out=self._soft_rhs)
+        self._soft_rhs[:soft] += rows.motion[hard:]
+        if self._driving:
+            given = ((rows.wrench @ kin.jacobian[:, self.driven]) * self._driven_mask) @ self.driven_step
+            self.b[:hard] -= given[:hard]
+            self._soft_rhs[:soft] -= given[hard:]
+        self._com_rows(hard, soft)
+        self._cost()
+        self._limits()
+
+    def _com_rows(self, at_hard: int, at_soft: int) -> None:
+        if not self._coms and not self._hard_joints:
+            return
+        J = self.kinematics.com_jacobian
+        for k, (com, axes) in enumerate(self._coms):
+            step = self._com_step[k][axes]
+            if self._driving:
+                step = step - J[np.ix_(axes, self.driven)] @ self.driven_step
+            into, rhs, at = (self.A, self.b, at_hard) if com.hard else (self._soft, self._soft_rhs, at_soft)
+            into[at : at + len(axes)] = J[np.ix_(axes, self._free)]
+            rhs[at : at + len(axes)] += step
+            if com.hard:
+                at_hard += len(axes)
+            else:
+                at_soft += len(axes)
+        for i, (joint, _, _) in enumerate(self._hard_joints):
+            self.A[at_hard + i, np.searchsorted(self._free, 6 + joint)] = 1.0
+            self.b[at_hard + i] += self._hard_joint_step[i]
+
+    def _cost(self) -> None:
+        np.multiply(self._soft, self._weight[:, None], out=self._weighted)
+        np.matmul(self._weighted.T, self._weighted, out=self.H)
+        diagonal = self._base_diagonal + float(np.abs(self._soft_error) @ self._curvature)
+        self.H.reshape(-1)[self._diag] += diagonal
+        np.matmul(self._weighted.T, self._weight * self._soft_rhs, out=self.g)
+        np.negative(self.g, out=self.g)
+        q = self.kinematics.q[self._q_index]
+        for posture in self._postures:
+            self.g[6:] -= posture.stiffness * (posture.pull * (posture.goal - posture.step - q) + posture.step)
+
+    def _limits(self) -> None:
+        q = self.kinematics.q[self._q_index]
+        np.clip(self._q_lower - q, -self._reach, self._reach, out=self.lower[6:])
+        np.clip(self._q_upper - q, -self._reach, self._reach, out=self.upper[6:])
+        polygon, limit = self.phase.polygon, self.phase.phase.support
+        if polygon is None or limit is None:
+            return
+        kin = self.kinematics
+        J = kin.com_jacobian[:2]
+        np.matmul(polygon.normals, J[:, self._free], out=self.C)
+        room = polygon.offsets - polygon.normals @ kin.com[:2] - (limit.margin + MARGIN_RESERVE)
+        np.maximum(room, -limit.recovery_speed * self.dt, out=self.d)
+        if self._driving:
+            self.d -= polygon.normals @ (J[:, self.driven] @ self.driven_step)
+
+    def linearise(self) -> None:
+        """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves."""
+        motion, steps, driving = self.rows.motion.copy(), self._com_step, self._driving
+        self.rows.motion[:], self._com_step, self._driving = 0.0, [np.zeros(3) for _ in steps], False
+        lower, upper = self.lower.copy(), self.upper.copy()
+        self.assemble()
+        self.rows.motion[:], self._com_step, self._driving = motion, steps, driving
+        self.lower[:], self.upper[:] = lower, upper
+
+    def reach(self, column: int) -> float:
+        """How far [m or rad] the speed limit lets a free column move in one tick."""
+        return float(self._reach[column - 6])
+
+    # -- names -----------------------------------------------------------------------------------------
+
+    def hard_names(self) -> list[tuple[str, str]]:
+        """(label, unit) of every hard row."""
+        names: list[tuple[str, str]] = []
+        for target, (_, n, _, m) in zip(self.rows.targets, self.rows.spans, strict=True):
+            if target.hard:
+                names += [(target.label, "m")] * n + [(target.label, "rad")] * m
+        for com, axes in self._coms:
+            if com.hard:
+                names += [(com.label, "m")] * len(axes)
+        return names + [(label, "rad") for _, _, label in self._hard_joints]
+
+    def edge_names(self) -> list[str]:
+        """Name of every support-polygon row: the two feet that its edge joins."""
+        if self.phase.polygon is None:
+            return []
+        feet = [c.frame for c in self.phase.phase.contacts]
+        return [f"support polygon edge {feet[i]}-{feet[j]}" for i, j in self.phase.polygon.edges]
+
+    def box_names(self) -> list[tuple[str, str]]:
+        """(lower, upper) bound's name of every free column."""
+        names: list[tuple[str, str]] = [("base", "base")] * 6
+        joints = self.phase.robot.joint_names
+        return names + [(f"{joints[c - 6]} lower", f"{joints[c - 6]} upper") for c in self._free[6:]]
+
+    def errors(self) -> dict[str, float]:
+        """Norm of every task's error at the last `measure`: '<label>.position' [m], '.orientation' [rad]."""
+        found: dict[str, float] = {}
+        for target, (i, n, j, m) in zip(self.rows.targets, self.rows.spans, strict=True):
+            if n:
+                found[f"{target.label}.position"] = float(np.linalg.norm(self.rows.error[i : i + n]))
+            if m:
+                found[f"{target.label}.orientation"] = float(np.linalg.norm(self.rows.error[j : j + m]))
+        for k, (com, axes) in enumerate(self._coms):
+            error = (self._com_goal[k] - self.kinematics.com)[axes]
+            found[f"{com.label}.position"] = float(np.linalg.norm(error))
+        q = self.kinematics.q
+        for posture in self._postures:
+            gap = (posture.goal - q[self._q_index])[posture.stiffness > 0]
+            found[f"{posture.label}.joints"] = float(np.linalg.norm(gap))
+        for i, (joint, _, label) in enumerate(self._hard_joints):
+            found[f"{label}.joints"] = float(np.hypot(found.get(f"{label}.joints", 0.0), self._hard_joint_goal[i] - q[7 + joint]))
+        return found
+

@@ -1,0 +1,276 @@
+"""One phase, tick by tick.
+
+    targets move on -> rows -> solve -> integrate -> measure -> keep, correct or refuse
+
+Nothing is integrated that is not finite or leaves a hard row; and what was integrated is measured, since
+rows are linear and the robot is not. A foot or loop that drifted by more than a hundredth of what is
+promised is put back by a least-norm correction within the same tick and the same speed limits.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbplan.backends import make_backend
+from wbplan.compiled import CompiledPhase, compile_phase
+from wbplan.errors import SolveError, SpecError
+from wbplan.qp import Solution
+from wbplan.retract import DRIFT, Retraction
+from wbplan.robot import Robot
+from wbplan.script import Phase
+from wbplan.stack import Stack
+from wbplan.state import State
+
+Array = NDArray[np.float64]
+
+#: A hard row further off than this [m or rad] after all correction breaks its promise (the checks allow 1e-4 m).
+PROMISE = 5e-5
+
+#: A multiplier below this share of the soft tasks' pull does not count as holding the robot back.
+FAINT = 1e-3
+
+
+@final
+@dataclass(frozen=True)
+class Active:
+    """A limit or hard row that holds the robot back.
+
+    Attributes:
+        name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
+        kind: 'position', 'speed', 'margin' or 'hard'.
+        multiplier: its Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver gives none.
+    """
+
+    name: str
+    kind: str
+    multiplier: float
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.kind})"
+
+
+@final
+class Tick:
+    """The outcome of one step.
+
+    Attributes:
+        t: time [s] of the phase at the end of the step.
+        q: (nq,) configuration then; v: (nv,) constant tangent velocity that led there [m/s, rad/s].
+        com: (3,) [m]; margin: [m], infinite where the phase has no support polygon.
+        microseconds: wall time of the step.
+        warning: '' or why a promise is not yet kept, as 'margin not yet reached'.
+    """
+
+    __slots__ = ("__dict__", "_loop", "_solution", "_stamp", "com", "margin", "microseconds", "q", "t", "v", "warning")
+
+    def __init__(
+        self, loop: Loop, t: float, q: Array, v: Array, com: Array, margin: float, solution: Solution, seconds: float
+    ) -> None:
+        self._loop, self._solution, self._stamp = loop, solution, loop.count
+        self.t, self.q, self.v, self.com, self.margin = t, q, v, com, margin
+        self.microseconds = 1e6 * seconds
+        promised = loop.compiled.margin
+        self.warning = ""
+        if promised is not None and margin < promised - 1e-6:
+            self.warning = f"margin not yet reached: {margin:.4f} m of {promised:.4f} m"
+
+    def _fresh(self, what: str) -> None:
+        if self._stamp != self._loop.count:
+            raise SpecError(f"tick.{what}: read it before the loop's next step")
+
+    @cached_property
+    def errors(self) -> Mapping[str, float]:
+        """Norm of each task's error at the end of the step, target minus actual.
+
+        Keys: '<task>.position' [m], '<task>.orientation' [rad], '<task>.joints' [rad].
+        """
+        self._fresh("errors")
+        return self._loop.stack.errors()
+
+    @cached_property
+    def active(self) -> tuple[Active, ...]:
+        """Limits and hard rows that held the robot back in this step, the strongest first."""
+        self._fresh("active")
+        return self._loop.active(self._solution)
+
+
+@final
+class Loop:
+    """A phase, ticked: for a controller, a slider, or the planner.
+
+    Args:
+        robot: the robot.
+        phase: what to do; its targets' times count from 0.
+        state: where to start, a `State` or (nq,) configuration.
+        dt: length of a tick [s].
+        backend: 'proxqp' or 'placo'.
+        placed: pose in the world of bodies that stand somewhere, by name.
+        roles: the role that each limb is in, where `q` leaves it open.
+
+    Raises:
+        SpecError: the phase does not fit the robot.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        phase: Phase,
+        state: State | Array,
+        dt: float = 0.002,
+        *,
+        backend: str = "proxqp",
+        placed: Mapping[str, Any] | None = None,
+        roles: Mapping[str, str | None] | None = None,
+    ) -> None:
+        if not (np.isfinite(dt) and dt > 0.0):
+            raise SpecError(f"dt: expected a positive number of seconds, got {dt}")
+        start = State(robot.model, state.q if isinstance(state, State) else state)
+        self.dt, self.t, self.count = float(dt), 0.0, 0
+        self.compiled: CompiledPhase = compile_phase(robot, phase, start.q, placed, roles)
+        self.stack = Stack(self.compiled, self.dt)
+        self.q: Array = np.array(start.q)
+        self.stack.aim(0.0)
+        self.stack.measure(self.q)
+        self._backend = make_backend(backend, self.stack)
+        self._retraction = Retraction(self.stack)
+        self._check_driven_speed()
+
+    def _check_driven_speed(self) -> None:
+        """A joint whose motion is given must not be asked to be faster than its limit."""
+        names, speed = self.compiled.robot.joint_names, self.compiled.model.velocityLimit[6:]
+        times = np.linspace(0.0, self.compiled.phase.duration, 201)
+        for d in self.compiled.driven:
+            if d.path.constant or d.path.live:
+                continue
+            rates = np.abs(np.diff([float(d.path.at(t)) for t in times])) / (times[1] - times[0])
+            if rates.max() > speed[d.joint]:
+                need = self.compiled.phase.duration * rates.max() / speed[d.joint]
+                raise SpecError(
+                    f"phase '{self.compiled.phase.name}': joint '{names[d.joint]}' would have to move at "
+                    f"{rates.max():.3g}, its limit is {speed[d.joint]:.3g}; give the phase {need:.2g} s or more"
+                )
+
+    @property
+    def margin(self) -> float:
+        """Stability margin now [m]."""
+        return self.stack.margin
+
+    def step(self, t: float | None = None) -> Tick:
+        """Move on by one tick, from time `t` [s] of the phase (by default where the last one ended).
+
+        Raises:
+            SolveError: no step keeps every hard row and limit. The loop's state is unchanged.
+        """
+        started = time.perf_counter()
+        stack, q = self.stack, self.q
+        if t is not None and t != self.t:
+            if not np.isfinite(t):
+                raise SpecError(f"Loop.step: expected a finite time in seconds, got {t}")
+            self.t = float(t)
+            stack.aim(self.t)
+            stack.measure(q)
+        elif stack.live:
+            stack.aim(self.t)
+            stack.measure(q)
+        before = stack.margin
+        ends = self.t + self.dt
+        stack.advance(ends)
+        try:
+            solution = self._backend.solve()
+            new = self._keep(q, solution.step, before)
+        except SolveError:
+            stack.aim(self.t)
+            stack.measure(q)
+            raise
+        v = pin.difference(self.compiled.model, q, new) / self.dt
+        self.q, self.t = new, ends
+        self.count += 1
+        com = stack.kinematics.com.copy()
+        return Tick(self, ends, new, v, com, stack.margin, solution, time.perf_counter() - started)
+
+    def _keep(self, q: Array, step: Array, before: float) -> Array:
+        """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""
+        stack, model = self.stack, self.compiled.model
+        if not np.isfinite(step).all():
+            raise SolveError(f"phase '{self.compiled.phase.name}': the solver's step is not finite")
+        new: Array = pin.integrate(model, q, step)
+        stack.measure(new)
+        if self._kept(before):
+            return new
+        new = self._retraction.correct(q, new, lambda: self._kept(before))
+        worst = int(np.abs(stack.hard_error).argmax()) if stack.n_hard else -1
+        if worst >= 0 and abs(stack.hard_error[worst]) > PROMISE:
+            label, unit = stack.hard_names()[worst]
+            raise SolveError(
+                f"phase '{self.compiled.phase.name}': '{label}' is off by {abs(stack.hard_error[worst]):.3g} {unit} "
+                f"after the step, {PROMISE:.0e} is allowed; move slower or use a smaller dt"
+            )
+        if not self._margin_kept(before):
+            raise SolveError(
+                f"phase '{self.compiled.phase.name}': the step leaves a stability margin of {stack.margin:.5f} m, "
+                f"{self.compiled.margin} m is promised; move slower or use a smaller dt"
+            )
+        return new
+
+    def _kept(self, before: float) -> bool:
+        stack = self.stack
+        drift = float(np.abs(stack.hard_error).max(initial=0.0))
+        return drift <= DRIFT and self._margin_kept(before)
+
+    def _margin_kept(self, before: float) -> bool:
+        """Inside the promise, or, coming from outside of it, no further out than before."""
+        promised = self.compiled.margin
+        if promised is None:
+            return True
+        return self.stack.margin >= min(promised, before) - 1e-9
+
+    def active(self, solution: Solution) -> tuple[Active, ...]:
+        """What held the robot back in a step; see `Tick.active`."""
+        stack = self.stack
+        pull = max(float(np.abs(stack.g).max(initial=0.0)), 1e-12)
+        found: list[Active] = []
+        if solution.box is not None and solution.edges is not None and solution.hard is not None:
+            for k in np.flatnonzero(np.abs(solution.box) > FAINT * pull):
+                found.append(self._bound(int(k), float(solution.box[k]), pull))
+            for k in np.flatnonzero(np.abs(solution.edges) > FAINT * pull):
+                found.append(Active(stack.edge_names()[k], "margin", float(abs(solution.edges[k]) / pull)))
+            hard: dict[str, float] = {}
+            for (label, _), y in zip(stack.hard_names(), solution.hard, strict=True):
+                hard[label] = max(hard.get(label, 0.0), abs(float(y)) / pull)
+            found += [Active(label, "hard", y) for label, y in hard.items() if y > FAINT]
+        else:
+            found = self._active_by_touch(solution)
+        return tuple(sorted(found, key=lambda a: -np.nan_to_num(a.multiplier)))
+
+    def _bound(self, column: int, multiplier: float, pull: float) -> Active:
+        lower, upper = self.stack.box_names()[column]
+        up = multiplier > 0
+        reach = self.stack.reach(column)
+        bound = self.stack.upper[column] if up else -self.stack.lower[column]
+        kind = "speed" if bound >= reach * (1 - 1e-9) else "position"
+        return Active(upper if up else lower, kind, abs(multiplier) / pull)
+
+    def _active_by_touch(self, solution: Solution) -> list[Active]:
+        """Bounds that the step touches: where the solver gives no multipliers."""
+        stack, x = self.stack, solution.step[self.compiled.free]
+        found = []
+        for k in range(6, len(x)):
+            for up, gap in ((True, stack.upper[k] - x[k]), (False, x[k] - stack.lower[k])):
+                if gap < 1e-9:
+                    name = stack.box_names()[k][int(up)]
+                    bound = stack.upper[k] if up else -stack.lower[k]
+                    kind = "speed" if bound >= stack.reach(k) * (1 - 1e-9) else "position"
+                    found.append(Active(name, kind, float("nan")))
+        promised, polygon = self.compiled.margin, self.compiled.polygon
+        if polygon is not None and promised is not None:
+            room = polygon.offsets - polygon.normals @ stack.kinematics.com[:2] - promised
+            found += [Active(stack.edge_names()[k], "margin", float("nan")) for k in np.flatnonzero(room < 2e-4)]
+        return found
