@@ -40,7 +40,8 @@ HEAD = '"""A task."""\nimport wbplan as wb\nROBOT = "legarm_hexapod"\n'
         (HEAD + "def script(robot):\n    return {}['key']\n", ["task.py, line 5", "KeyError"]),
         (HEAD + "def script(robot):\n    return wb.Script()\n", ["task.py, line 5", "one or more phases"]),
         (
-            HEAD + "def script(robot):\n    return wb.Script(wb.Phase('a', contacts=[wb.Contact('no_foot', friction=0.7)]))\n",
+            HEAD
+            + "def script(robot):\n    return wb.Script(wb.Phase('a', contacts=[wb.Contact('no_foot', friction=0.7)]))\n",
             ["no_foot"],
         ),
         (
@@ -48,7 +49,10 @@ HEAD = '"""A task."""\nimport wbplan as wb\nROBOT = "legarm_hexapod"\n'
             "    return wb.Script(wb.Phase('a', hard=[wb.ComTask((float('nan'), 0.0, 0.3))]))\n",
             ["task.py, line 5", "nan"],
         ),
-        (HEAD.replace("legarm_hexapod", "no_robot") + "def script(robot): ...\n", ["no_robot", "legarm_hexapod"]),
+        (
+            HEAD.replace("legarm_hexapod", "no_robot") + "def script(robot): ...\n",
+            ["no_robot", "legarm_hexapod"],
+        ),
     ],
     ids=lambda value: "" if isinstance(value, list) else None,
 )
@@ -130,8 +134,7 @@ def test_any_text_is_converted_or_refused(annotation: object, text: str) -> None
 def test_what_a_task_file_says(tmp_path: Path) -> None:
     path = tmp_path / "reach.py"
     path.write_text(
-        "from __future__ import annotations\n"
-        + HEAD.replace("A task.", "Reach out.\n\nMore.")
+        HEAD.replace('"""A task."""\n', '"""Reach out.\n\nMore.\n"""\nfrom __future__ import annotations\n')
         + "def script(robot, *, far: float = 1, up: tuple[float, ...] = (0.0, 1.0)) -> wb.Script: ...\n",
         encoding="utf-8",
     )

@@ -21,20 +21,23 @@ LAYERS = [
     "limits",
     "bodies",
     "script",
-    "qp",
-    "rows",
-    "kinematics",
     "compiled",
+    "kinematics",
+    "rows",
     "stack",
     "diagnose",
+    "qp",
+    "retract",
     "backends",
     "tick",
     "bundle",
     "checks",
     "plots",
     "view",
+    "recorder",
     "planner",
     "taskfile",
+    "live",
     "printing",
     "cli",
 ]
@@ -88,10 +91,26 @@ def test_imports_only_from_above(path: Path) -> None:
 
 @pytest.mark.parametrize(
     "source",
-    ["import wbplan", "from wbplan import cli", "def f():\n    from wbplan.cli import main", "from wbplan import Robot"],
+    [
+        "import wbplan",
+        "from wbplan import cli",
+        "def f():\n    from wbplan.cli import main",
+        "from wbplan import Robot",
+    ],
 )
 def test_an_import_from_below_is_seen(source: str) -> None:
     assert faults(PACKAGE / "geometry.py", source)
+
+
+def test_what_planned_never_approves() -> None:
+    """The checks see the bundle and geometry, and nothing that plans, however far back."""
+    sees = {"checks"}
+    while (
+        more := {name for p in FILES if layer_of(p) in sees for _, name in imports_of(p) if name in LAYERS}
+        - sees
+    ):
+        sees |= more
+    assert sees <= {"checks", "bundle", "geometry", "errors"}
 
 
 def test_tasks_use_the_public_names_only() -> None:

@@ -1,6 +1,6 @@
 """Looks at a page of the view in headless Chromium: for the tests, and for pictures of a saved plan.
 
-    python tests/view/browser.py out/clamp/scene.html --time 12.3 picture.png
+python tests/view/browser.py out/clamp/scene.html --time 12.3 picture.png
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class View:
         self.page.evaluate(TWO_FRAMES)
 
     def only(self, *kinds: str) -> None:
-        """Hides everything but some kinds of things, and the background, so that alpha is 0 where nothing is."""
+        """Hides the background and all but some kinds of things: alpha is 0 where nothing is."""
         self.page.evaluate(
             """([all, kept]) => {
                 viewer.set_property(["Background"], "visible", false);
@@ -132,7 +132,7 @@ def main() -> None:
     reader.add_argument("picture", type=Path)
     reader.add_argument("--time", type=float, default=0.0, help="[s]")
     reader.add_argument("--size", default="1280x800")
-    reader.add_argument("--scale", type=float, default=1.0, help="pixels of the picture per pixel of the page")
+    reader.add_argument("--scale", type=float, default=1.0, help="pixels per pixel of the page")
     reader.add_argument("--bare", action="store_true", help="without label, time bar and controls")
     asked = reader.parse_args()
     width, height = (int(n) for n in asked.size.split("x"))

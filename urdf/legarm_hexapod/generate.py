@@ -41,7 +41,7 @@ class Servo:
 
 
 DRS_0401 = Servo(0.123, (0.056, 0.035, 0.038), 0.018, 52 * KGF_CM, radians(60) / 0.147)
-DRS_0101 = Servo(0.045, (0.045, 0.024, 0.031), 0.010, 12 * KGF_CM, radians(60) / 0.166)
+DRS_0101 = Servo(0.045, (0.045, 0.024, 0.031), 0.008, 12 * KGF_CM, radians(60) / 0.166)
 
 
 @dataclass(frozen=True)
@@ -262,16 +262,17 @@ def slide(limb: str, structure: float) -> Link:
 
 
 def arm1(limb: str, structure: float) -> Link:
-    """Cheeks on joint 4, hollow between them for the withdrawn foot, and plates above and below joint 5."""
-    cheeks = [
-        block((-0.009, y, -0.020), (0.009, y + 0.0025, 0.020), "blue", solid=True) for y in (-0.0185, 0.0160)
-    ]
-    plates = [
-        block((0.005, -0.0185, z), (T.arm1 + 0.009, 0.0185, z + 0.0020), "blue", solid=True) for z in (-0.020, 0.018)
-    ]
+    """Cheeks on joint 4 and plates above and below joint 5; open at the back, where the withdrawn foot goes in."""
+    parts = []
+    for y in (-0.0185, 0.0160):
+        parts.append(block((-0.009, y, -0.020), (0.010, y + 0.0025, 0.020), "blue", solid=True))
+        for z in (-0.020, 0.017):  # lugs out to the plates, clear of the swinging arm 2
+            parts.append(block((0.010, y, z), (T.arm1 + 0.009, y + 0.0025, z + 0.003), "blue", solid=True))
+    for z in (-0.020, 0.018):
+        parts.append(block((0.0165, -0.0160, z), (T.arm1 + 0.009, 0.0160, z + 0.0020), "blue", solid=True))
     discs = horns((T.arm1, 0.0, 0.0), "z", 0.0155, 0.0180, 0.007)
     pins = horns(ORIGIN, "y", 0.0185, 0.0220, 0.005)
-    return Link(f"{limb}_arm1", (*cheeks, *plates, *discs, *pins), structure)
+    return Link(f"{limb}_arm1", (*parts, *discs, *pins), structure)
 
 
 def arm2(limb: str, structure: float) -> Link:
@@ -279,14 +280,14 @@ def arm2(limb: str, structure: float) -> Link:
     face = T.arm2
     parts = [
         housing(DRS_0101, ORIGIN, "x", "z", back=False),
-        block((0.035, -0.010, -0.012), (0.046, 0.010, 0.012), "blue"),
+        block((0.037, -0.010, -0.012), (0.046, 0.010, 0.012), "blue"),
         block((0.046, -0.012, -0.0155), (0.091, 0.012, 0.0155), "servo_black", mass=DRS_0101.mass),
     ]
     for low, high in ((0.0040, 0.0155), (-0.0155, -0.0040)):
         parts.append(block((0.091, -0.018, low), (face - 0.006, 0.018, high), "blue"))
         parts.append(block((face - 0.006, -0.018, low), (face, 0.018, high), "palm_rubber"))
     covers = (
-        block((-0.010, -0.012, -0.0155), (0.091, 0.012, 0.0155)),
+        block((-0.008, -0.012, -0.0155), (0.091, 0.012, 0.0155)),
         block((0.091, -0.018, -0.0155), (face, 0.018, 0.0155)),
     )
     return Link(f"{limb}_arm2", tuple(parts), structure, covers)

@@ -29,7 +29,8 @@ class Trajectory:
         com: (N, 3) [m], world: centre of mass of the robot and the objects that it carries.
         margin: (N,) [m] of the CoM in the support polygon, inside > 0; nan where there is no polygon.
         joint_names: the joints after the free flyer, in Pinocchio's order.
-        bodies: object name -> (N, 7) its pose in the world, x y z [m] qx qy qz qw.
+        bodies: object name -> (N, 7) its pose in the world, x y z [m] qx qy qz qw;
+            nan while it has none.
         targets: task name -> (N, 7) the pose that it was asked for, world; nan where it was not.
         errors: "<task>.position" [m], "<task>.orientation" [rad] ... -> (N,); nan where absent.
     """

@@ -98,9 +98,10 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         array = _array(motion, key)
         if array.shape != shape:
             raise BundleError(f"{where}: {key}: expected shape {shape}, found {array.shape}")
-        # A margin, target or error may be absent at a sample; all else is there or broken.
-        always = key in ("time", "q", "v", "com") or key.startswith("body_")
-        if values and always and not np.isfinite(array).all():
+        if key == "phase" and array.dtype.kind not in "iu":
+            raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
+        # A margin, object, target or error may be absent at a sample; all else is there or broken.
+        if values and key in ("time", "q", "v", "com") and not np.isfinite(array).all():
             at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
 

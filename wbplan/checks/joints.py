@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,13 @@ def sampling_rows(bundle: Bundle) -> list[Row]:
     samples = np.arange(len(motion), dtype=np.float64)
     names = [bundle.phases[i]["name"] for i in motion.phase]
     finite = Worst("values finite", "values")
-    for key in ("time", "q", "v", "com", *(f"body_{name}" for name in motion.bodies)):
-        array = motion.bodies[key[5:]] if key.startswith("body_") else getattr(motion, key)
-        broken = np.count_nonzero(~np.isfinite(array.reshape(len(motion), -1)), axis=1)
+    for key in ("time", "q", "v", "com"):
+        broken = np.count_nonzero(~np.isfinite(getattr(motion, key).reshape(len(motion), -1)), axis=1)
         # Time itself may be what is broken: say the sample instead.
-        finite.see(broken, 0.0, motion.time, names, [f"{key}, sample {int(samples[np.argmax(broken)])}"])
+        where = f"{key}, sample {int(samples[np.argmax(broken)])}" if broken.any() else ""
+        finite.see(broken, 0.0, motion.time, names, [where])
     increases = Worst("time increases", "s", at_least=True)
-    increases.see(np.diff(motion.time), EDGE, motion.time[:-1], names, ["step"])
+    increases.see(np.diff(motion.time), EDGE, motion.time[:-1], names, [""])
     return [*finite.rows(), *increases.rows()]
 
 
@@ -47,7 +48,7 @@ def rows(replay: Replay, bounds: Tolerances) -> list[Row]:
 def _sampling(replay: Replay) -> list[Row]:
     time, dt = replay.record.time, float(replay.plan["dt"])
     spacing = Worst("sample spacing", "s")
-    spacing.see(np.abs(np.diff(time) - dt), EDGE, time[:-1], replay.phase_names, ["off dt"])
+    spacing.see(np.abs(np.diff(time) - dt), EDGE, time[:-1], replay.phase_names, [""])
     edges = Worst("phase edges sampled", "s")
     for window in replay.windows:
         for key in ("start", "end"):
@@ -76,16 +77,18 @@ def _positions(replay: Replay) -> list[Row]:
     excess = np.maximum(
         model.lowerPositionLimit[columns] - values, values - model.upperPositionLimit[columns]
     )
-    worst = Worst("joint positions", "rad or m beyond limit", slack=1e-9)
-    worst.see(excess, 0.0, replay.record.time, replay.phase_names, [name for name, _ in limited])
+    worst = Worst("joint beyond position limit", "rad", slack=1e-9)
+    names = [name for name, _ in limited]
+    worst.see(excess, 0.0, replay.record.time, replay.phase_names, names, _units(model, names, ""))
     return worst.rows()
 
 
 def _speeds(replay: Replay) -> list[Row]:
     """|q[k+1] - q[k]| / (t[k+1] - t[k]) - speed limit <= 0."""
     excess = np.abs(replay.step[:, 6:]) - replay.model.velocityLimit[6:]
-    worst = Worst("joint speeds", "rad/s or m/s beyond limit", slack=1e-6)
-    worst.see(excess, 0.0, replay.record.time[:-1], replay.phase_names, replay.record.joint_names)
+    worst = Worst("joint beyond speed limit", "rad/s", slack=1e-6)
+    names = replay.record.joint_names
+    worst.see(excess, 0.0, replay.record.time[:-1], replay.phase_names, names, _units(replay.model, names, "/s"))
     return worst.rows()
 
 
@@ -96,8 +99,10 @@ def _accelerations(replay: Replay) -> list[Row]:
     limit = np.array(replay.plan["joint_acceleration"], dtype=np.float64)
     duration = np.diff(replay.record.time)[1:, None]
     excess = np.abs(np.diff(replay.step[:, 6:], axis=0)) / duration - limit
-    worst = Worst("joint accelerations", "rad/s2 or m/s2 beyond limit", slack=1e-6)
-    worst.see(excess, 0.0, replay.record.time[1:-1], replay.phase_names[1:], replay.record.joint_names)
+    worst = Worst("joint beyond acceleration limit", "rad/s2", slack=1e-6)
+    names = replay.record.joint_names
+    units = _units(replay.model, names, "/s2")
+    worst.see(excess, 0.0, replay.record.time[1:-1], replay.phase_names[1:], names, units)
     return worst.rows()
 
 
@@ -118,18 +123,18 @@ def _continuity(replay: Replay) -> list[Row]:
 def _velocity_record(replay: Replay) -> list[Row]:
     """The recorded v[k] leads from q[k] to q[k+1]; the last one is zero."""
     expected = np.vstack([replay.step, np.zeros((1, replay.model.nv))])
-    names = [
-        "base x",
-        "base y",
-        "base z",
-        "base turn x",
-        "base turn y",
-        "base turn z",
-        *replay.record.joint_names,
-    ]
-    worst = Worst("v agrees with q", "rad/s or m/s")
-    worst.see(np.abs(replay.record.v - expected), 1e-6, replay.record.time, replay.phase_names, names)
+    base = ["base x", "base y", "base z", "base turn x", "base turn y", "base turn z"]
+    names = [*base, *replay.record.joint_names]
+    units = ["m/s"] * 3 + ["rad/s"] * 3 + _units(replay.model, replay.record.joint_names, "/s")
+    worst = Worst("v agrees with q", "rad/s")
+    worst.see(np.abs(replay.record.v - expected), 1e-6, replay.record.time, replay.phase_names, names, units)
     return worst.rows()
+
+
+def _units(model: Any, names: Sequence[str], per: str) -> list[str]:
+    """Unit of each joint's value: metres where it slides."""
+    slides = [model.joints[model.getJointId(name)].shortname().startswith("JointModelP") for name in names]
+    return [("m" if slide else "rad") + per for slide in slides]
 
 
 def _joints(model: Any) -> list[tuple[str, Any]]:

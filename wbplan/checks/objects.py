@@ -42,11 +42,14 @@ def _objects(replay: Replay, bounds: Tolerances) -> list[Row]:
     place, turn = Worst("object place", "m"), Worst("object turn", "rad")
     for name, recorded in replay.record.bodies.items():
         path = Poses.of(recorded)
-        left = path[:1]
+        known = np.isfinite(recorded).all(axis=1)
+        left: Poses | None = None
         for window in replay.windows:
-            samples = window.samples
             item = _carried(window, name)
-            expected = left if item is None else replay.held_pose(item, samples)
+            samples = window.samples if item is not None else window.samples[known[window.samples]]
+            if not len(samples):
+                continue  # an object need not have a pose before anybody touches it
+            expected = replay.held_pose(item, samples) if item is not None else left or path[samples[:1]]
             own = (item is not None) & (replay.record.phase[samples] == window.index)
             times = replay.times(samples)
             for worst, off, bound in (

@@ -84,6 +84,7 @@ class Worst:
         time: ArrayLike,
         phase: Sequence[str] | str,
         where: Sequence[str],
+        units: Sequence[str] = (),
     ) -> None:
         """Take in the values (K, M) of M things at K times.
 
@@ -93,11 +94,12 @@ class Worst:
             time: (K,) [s].
             phase: name of the phase, or one for each sample.
             where: (M,) names of the things.
+            units: (M,) units, where the things have not the same one.
         """
         found = np.asarray(values, dtype=np.float64)
-        found = found.reshape(len(found), -1)
         if not found.size:
             return
+        found = found.reshape(len(found), -1)
         bounds = np.broadcast_to(np.asarray(bound, dtype=np.float64), found.shape)
         excess = np.where(found == bounds, 0.0, (found - bounds) * (-1.0 if self._at_least else 1.0))
         k, j = np.unravel_index(int(np.argmax(excess)), excess.shape)  # argmax stops at the first nan
@@ -108,7 +110,7 @@ class Worst:
             promise=self._promise,
             worst=float(found[k, j]),
             bound=float(bounds[k, j]),
-            unit=self._unit,
+            unit=units[int(j)] if units else self._unit,
             at_least=self._at_least,
             time=float(np.asarray(time)[k]),
             phase=phase if isinstance(phase, str) else phase[int(k)],

@@ -8,13 +8,14 @@ from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
+from xml.etree.ElementTree import tostring
 
 import pinocchio as pin
 
 from wbplan import catalog
 from wbplan.errors import ModelError, SpecError, listing
 from wbplan.robot.description import Robot
-from wbplan.robot.reading import read_text
+from wbplan.robot.reading import parse_xml, read_text
 from wbplan.robot.srdf import Srdf, Tree, read_srdf
 from wbplan.robot.urdf_check import examine
 from wbplan.state import find_frame
@@ -127,8 +128,13 @@ def _headline(kind: str, path: Path, problems: Sequence[str]) -> str:
 
 
 def _build(text: str, path: Path) -> pin.Model:
+    """The model. Shapes play no part in it, so they are left out: the parser complains of them on stderr."""
+    root = parse_xml(text)
+    for parent in [root, *root.findall("link")]:
+        for element in [*parent.findall("visual"), *parent.findall("collision"), *parent.findall("material")]:
+            parent.remove(element)
     try:
-        return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+        return pin.buildModelFromXML(tostring(root, encoding="unicode"), pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError) as error:
         # Whatever the checks did not foresee still has to name the file.
         raise ModelError(_headline("URDF", path, ["?"]), [f"Pinocchio refuses it: {error}"]) from error

@@ -108,23 +108,35 @@ def _check_joint(reader: Reader, name: str, element: Element, links: Mapping[str
     reader.optional(where, element.find("origin"), (("xyz", 3), ("rpy", 3)))
     if element.find("mimic") is not None:
         reader.problem(where, "mimic joints are not supported; remove <mimic>, or make the joint fixed")
+    _check_details(reader, where, element)
     if kind in ("revolute", "prismatic"):
         _check_motion(reader, where, element, kind)
+    elif (limit := element.find("limit")) is not None:
+        for what in ("velocity", "effort"):  # Pinocchio's parser insists, even where they mean nothing
+            reader.number(where, f"limit {what}", limit.get(what))
     return _Joint(name, kind, ends["parent"], ends["child"])
 
 
+def _check_details(reader: Reader, where: str, element: Element) -> None:
+    """What a joint of any kind may have beside its limits."""
+    dynamics, safety = element.find("dynamics"), element.find("safety_controller")
+    reader.optional(where, dynamics, (("damping", 1), ("friction", 1)))
+    if dynamics is not None and dynamics.get("damping") is None and dynamics.get("friction") is None:
+        reader.problem(where, "its dynamics has neither damping nor friction")
+    reader.optional(where, element.find("calibration"), (("rising", 1), ("falling", 1)))
+    soft = (("soft_lower_limit", 1), ("soft_upper_limit", 1), ("k_position", 1), ("k_velocity", 1))
+    reader.optional(where, safety, soft)
+    if safety is not None and safety.get("k_velocity") is None:
+        reader.problem(where, "safety_controller k_velocity is missing, expected a finite number")
+
+
 def _check_motion(reader: Reader, where: str, element: Element, kind: str) -> None:
-    """Axis, limits and dynamics of a joint that moves."""
+    """Axis and limits of a joint that moves."""
     axis = element.find("axis")
     if axis is not None:
         direction = reader.numbers(where, "axis", axis.get("xyz"), 3)
         if direction is not None and math.hypot(*direction) < 1e-6:
             reader.problem(where, f"axis is '{axis.get('xyz')}', expected a direction")
-    reader.optional(where, element.find("dynamics"), (("damping", 1), ("friction", 1)))
-    reader.optional(where, element.find("calibration"), (("rising", 1), ("falling", 1)))
-    soft = (("soft_lower_limit", 1), ("soft_upper_limit", 1), ("k_position", 1), ("k_velocity", 1))
-    reader.optional(where, element.find("safety_controller"), soft)
-
     limit = element.find("limit")
     if limit is None:
         reader.problem(where, f"no <limit>, expected one, for it is {kind}")

@@ -20,13 +20,15 @@ FLOAT32 = 0x17
 class Command(Protocol):
     """A Meshcat command: anything that lowers itself to the page's message."""
 
-    def lower(self) -> dict[str, Any]: ...
+    def lower(self) -> dict[str, Any]:
+        """The page's message, with its "type" and "path"."""
 
 
 class Window(Protocol):
     """Where commands go; Meshcat's own ViewerWindow is one."""
 
-    def send(self, command: Command) -> None: ...
+    def send(self, command: Command) -> None:
+        """Takes a command."""
 
 
 def floats(values: ArrayLike) -> Any:
@@ -144,7 +146,7 @@ class Store:
         return data
 
     def messages(self) -> list[bytes]:
-        """Everything that a fresh page has to be told, in order; the animation, which binds to nodes, last."""
+        """All that a fresh page has to be told, in order; the animation, which binds to nodes, last."""
         return [*self._kept.values(), *([self._animation] if self._animation is not None else [])]
 
 

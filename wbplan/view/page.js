@@ -90,7 +90,8 @@ function tell(t) {
   write(title, story.names[i]);
   const margin = story.margins[k];
   write(detail, `${story.title}  ·  phase ${i + 1} of ${story.names.length}` +
-    (Number.isFinite(margin) ? `  ·  margin ${(1000 * margin).toFixed(0)} mm` : ""));
+    (Number.isFinite(margin) ? `  ·  margin ${(1000 * margin).toFixed(0)} mm` : "") +
+    (story.asked[i] > -1e8 ? `, at least ${(1000 * story.asked[i]).toFixed(0)}` : ""));
   write(byId("clock"), `${t.toFixed(2)} / ${story.duration.toFixed(1)} s`);
   byId("knob").style.left = `${100 * t / story.duration}%`;
   const marks = byId("phases").children;

@@ -23,7 +23,7 @@ def live_page(title: str) -> str:
 def still_page(title: str, messages: Iterable[bytes]) -> str:
     """A page that carries its scene within, for `file://`, a mail or a notebook.
 
-    The messages are joined, each after its length (4 bytes, big-endian), compressed, and unpacked by the page.
+    The messages are joined, each after its length (4 bytes, big-endian), and compressed.
 
     Args:
         title: of the page.

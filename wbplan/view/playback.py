@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,7 +105,7 @@ def page(bundle: Bundle, *, package_dirs: Sequence[str | Path] = ()) -> str:
     return still_page(_title(bundle), store.messages())
 
 
-def write_html(bundle: Bundle, path: str | Path, *, package_dirs: Sequence[str | Path] = ()) -> Path:
+def write_html(bundle: Bundle, path: str | Path, *, package_dirs: Sequence[str | Path] = ()) -> None:
     """Writes `page` to a file, whole or not at all.
 
     Args:
@@ -114,29 +113,19 @@ def write_html(bundle: Bundle, path: str | Path, *, package_dirs: Sequence[str |
         path: the file; its folder has to exist.
         package_dirs: where the robot's meshes are looked for.
 
-    Returns:
-        The file.
-
     Raises:
         ViewError: the file cannot be written, or a mesh is missing.
     """
     goal = Path(path)
     text = page(bundle, package_dirs=package_dirs)
-    part: str | None = None
+    part = goal.with_name(f".{goal.name}.{os.getpid()}.part")
     try:
-        with tempfile.NamedTemporaryFile(
-            "w", dir=goal.parent, prefix=f".{goal.name}.", suffix=".part", delete=False, encoding="utf-8"
-        ) as file:
-            part = file.name
-            file.write(text)
-        Path(part).chmod(0o666 & ~_umask())
-        Path(part).replace(goal)
+        part.write_text(text, encoding="utf-8")
+        part.replace(goal)
     except OSError as error:
         raise ViewError(f"view: {goal} cannot be written: {error.strerror or error}") from error
     finally:
-        if part is not None:
-            Path(part).unlink(missing_ok=True)
-    return goal
+        part.unlink(missing_ok=True)
 
 
 def inline(bundle: Bundle, *, height: int = 520, package_dirs: Sequence[str | Path] = ()) -> Any:
@@ -150,8 +139,6 @@ def inline(bundle: Bundle, *, height: int = 520, package_dirs: Sequence[str | Pa
     Returns:
         An `IPython.display.HTML`.
     """
-    from IPython.display import HTML
-
     text = html.escape(page(bundle, package_dirs=package_dirs), quote=True)
     style = f"width: 100%; height: {int(height)}px; border: 0; border-radius: 8px"
     return HTML(
@@ -207,7 +194,7 @@ class _Playback:
         self.draw_in.window.send(SetAnimation(self.tracks, self.duration))
 
     def _kinematics(self) -> None:
-        """Poses (N, L, 4, 4) of all links and places (N, 3) of all tips, and the space that the robot takes."""
+        """Poses (N, L, 4, 4) of links, places (N, 3) of tips, and corners of the space that is taken."""
         frames = [*self.feet, *self.tips]
         poses, places, corners = [], [], []
         every = max(1, len(self.picked) // 24)
@@ -258,7 +245,7 @@ class _Playback:
                 path = self.draw_in.support(str(len(drawn)), region.vertices, inset, self.ground[number])
                 drawn[key] = (path, now)
             else:
-                drawn[key] = (drawn[key][0], drawn[key][1] | now)
+                drawn[key] = (drawn[key][0], np.logical_or(drawn[key][1], now))
         for path, shown in drawn.values():
             self._visible(path, shown)
 
@@ -325,6 +312,7 @@ class _Playback:
             "starts": starts,
             "times": floats(self.time),
             "margins": floats(self.trajectory.margin[self.picked]),
+            "asked": [float(phase["margin"]) for phase in self.phases],
         }
         self.draw_in.tell("/wbplan/overlay", "story", story)
 
@@ -332,7 +320,7 @@ class _Playback:
 
     def _posed(self, path: str, poses: Array) -> Array:
         """A node at poses (N, 7), hidden where they are not known; returns those that are."""
-        known = np.isfinite(poses).all(axis=1)
+        known: Bools = np.isfinite(poses).all(axis=1)
         if known.any():
             held = poses[np.maximum.accumulate(np.where(known, np.arange(len(poses)), int(np.argmax(known))))]
             self._moving(path, held[:, :3], held[:, 3:])
@@ -350,7 +338,7 @@ class _Playback:
     def _visible(self, path: str, shown: Bools) -> None:
         if shown.all():
             return
-        first = np.flatnonzero(np.diff(shown, prepend=not shown[0]))
+        first = np.flatnonzero(np.append(True, shown[1:] != shown[:-1]))
         self.tracks.append(Track(path, "visible", self.time[first], shown[first]))
 
 
@@ -401,9 +389,3 @@ def _title_of(plan: Mapping[str, Any]) -> str:
 
 def _title(bundle: Bundle) -> str:
     return _title_of(bundle.plan)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -117,9 +117,7 @@ def _triangles(geometry: Any, link: str, folders: Sequence[Path]) -> list[Any]:
     if geometry.box is not None:
         return [create.box(extents=geometry.box.size)]
     if geometry.cylinder is not None:
-        return [
-            create.cylinder(radius=geometry.cylinder.radius, height=geometry.cylinder.length, sections=28)
-        ]
+        return [create.cylinder(geometry.cylinder.radius, geometry.cylinder.length, sections=28)]
     if geometry.sphere is not None:
         return [create.icosphere(subdivisions=3, radius=geometry.sphere.radius)]
     if geometry.mesh is not None:

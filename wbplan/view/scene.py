@@ -11,7 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.view import shapes
-from wbplan.view.drawing import DISC_Z, GRADES, VIEW_DISTANCE, Drawing, body_sizes, box_corners, grade, node, pose7
+from wbplan.view.drawing import (
+    DISC_Z,
+    GRADES,
+    VIEW_DISTANCE,
+    Drawing,
+    body_sizes,
+    box_corners,
+    grade,
+    node,
+    pose7,
+)
 from wbplan.view.figure import Figure
 from wbplan.view.messages import Window
 
@@ -73,7 +83,9 @@ class Scene:
     def look(self, eye: ArrayLike, target: ArrayLike) -> None:
         """Aims the camera from one place at another, (3,) [m] each, world; it then stays there."""
         if not self._aimed:
-            self._draw.ground(target, float(np.linalg.norm(np.asarray(eye) - np.asarray(target))) / VIEW_DISTANCE)
+            self._draw.ground(
+                target, float(np.linalg.norm(np.asarray(eye) - np.asarray(target))) / VIEW_DISTANCE
+            )
         self._aimed = True
         self._draw.look(eye, target)
 

@@ -15,10 +15,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import meshcat
-import tornado.httpserver
-import tornado.netutil
-import tornado.web
-import tornado.websocket
+from tornado.httpserver import HTTPServer
+from tornado.netutil import bind_sockets
+from tornado.web import Application, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from wbplan.errors import ViewError
 from wbplan.view.messages import Command, Store, visualizer
@@ -69,7 +69,8 @@ class Server:
             target=lambda: asyncio.run(self._serve(sockets)), name=f"wbplan-view-{self.port}", daemon=True
         )
         self._thread.start()
-        self._started.wait()
+        if not self._started.wait(10.0):
+            raise ViewError(f"view: the server at {self.url} did not start")
 
     def send(self, command: Command) -> None:
         """Draws: keeps the command for later pages and sends it to the open ones.
@@ -82,8 +83,7 @@ class Server:
             if self._stopping:
                 raise ViewError(f"the view at {self.url} has been stopped; start a new one")
             self._queue.append(self._store.keep(command))
-            first = len(self._queue) == 1
-            if first:
+            if len(self._queue) == 1:
                 self._loop.call_soon_threadsafe(self._flush)
 
     @property
@@ -122,14 +122,14 @@ class Server:
     async def _serve(self, sockets: list[socket.socket]) -> None:
         self._loop = asyncio.get_running_loop()
         self._stopped = asyncio.Event()
-        app = tornado.web.Application(
+        app = Application(
             [
                 (r"/(?:index\.html|static/)?", _Page, {"page": self._page}),
                 (r"/messages", _Socket, {"server": self}),
             ],
             log_function=lambda handler: None,
         )
-        http = tornado.httpserver.HTTPServer(app)
+        http = HTTPServer(app)
         http.add_sockets(sockets)
         self._started.set()
         await self._stopped.wait()
@@ -156,7 +156,7 @@ class Server:
         self._pages.discard(page)
 
 
-class _Page(tornado.web.RequestHandler):
+class _Page(RequestHandler):  # type: ignore[misc]
     def initialize(self, page: str) -> None:
         self._page = page
 
@@ -166,7 +166,7 @@ class _Page(tornado.web.RequestHandler):
         self.write(self._page)
 
 
-class _Socket(tornado.websocket.WebSocketHandler):
+class _Socket(WebSocketHandler):  # type: ignore[misc]
     def initialize(self, server: Server) -> None:
         self._server = server
         self._waiting = 0
@@ -188,7 +188,7 @@ class _Socket(tornado.websocket.WebSocketHandler):
         for data in messages:
             try:
                 sent = self.write_message(data, binary=True)
-            except tornado.websocket.WebSocketClosedError:
+            except WebSocketClosedError:
                 return
             self._waiting += 1
             sent.add_done_callback(self._sent)
@@ -205,7 +205,8 @@ def _bind(host: str, port: int | None) -> list[socket.socket]:
         raise ViewError(f"view: port has to be from 1 to 65535, found {port}; leave it out for a free one")
     for wanted in [port] if port is not None else [*PORTS, 0]:
         try:
-            return tornado.netutil.bind_sockets(wanted, address=host)
+            sockets: list[socket.socket] = bind_sockets(wanted, address=host)
+            return sockets
         except (OSError, UnicodeError) as error:
             if port is None and getattr(error, "errno", None) == errno.EADDRINUSE:
                 continue

@@ -120,7 +120,8 @@ def filled(polygon: ArrayLike, z: float, colour: Colour, opacity: float) -> Any:
 def outlined(polygon: ArrayLike, z: float, width: float, colour: Colour, opacity: float = 1.0) -> Any:
     """The edges of a polygon (V, 2) as flat ribbons of a width, at a height."""
     corners = _at(polygon, z)
-    vertices, faces = [], []
+    vertices: list[Array] = []
+    faces: list[list[int]] = []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-12) * (width / 2.0)
         across = np.array([-along[1], along[0], 0.0])
@@ -186,11 +187,9 @@ def _spike(start: Array, end: Array, radius: float, pointed: bool) -> tuple[Arra
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(8)]) @ _upright(end - start).T * radius
     vertices = np.vstack([start + ring, end + ring * (0.0 if pointed else 1.0), start[None], end[None]])
     i = np.arange(8)
-    j = (i + 1) % 8
-    faces = [
-        np.column_stack(columns)
-        for columns in ((i, j, j + 8), (i, j + 8, i + 8), (j, i, 0 * i + 16), (i + 8, j + 8, 0 * i + 17))
-    ]
+    j, bottom, top = (i + 1) % 8, np.full(8, 16), np.full(8, 17)
+    columns = ((i, j, j + 8), (i, j + 8, i + 8), (j, i, bottom), (i + 8, j + 8, top))
+    faces = [np.column_stack(corners) for corners in columns]
     return vertices, np.vstack(faces)
 
 
