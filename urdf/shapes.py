@@ -1,7 +1,7 @@
 """Primitive solids: what they look like in a URDF, and what they weigh.
 
-A robot's generator lists the parts of each link once; visuals, collisions and inertias come from that one list,
-so that a picture and a moment of inertia can never tell two different stories.
+A robot's generator lists the parts of each link once; visuals, collisions and inertias come from that one
+list, so that a picture and a moment of inertia can never tell two different stories.
 
 All lengths are in metres, masses in kilograms, angles in radians. `rpy` is URDF's: fixed axes x, y, z,
 R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -9,7 +9,6 @@ R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin, sqrt
@@ -45,136 +44,74 @@ def angles(matrix: Array) -> Triple:
     return (atan2(matrix[2, 1], matrix[2, 2]), pitch, atan2(matrix[1, 0], matrix[0, 0]))
 
 
-class Shape(ABC):
-    """A solid around its own centre, with axes along its symmetries."""
-
-    @property
-    @abstractmethod
-    def volume(self) -> float:
-        """Volume [m^3]."""
-
-    @abstractmethod
-    def moments(self, mass: float) -> Triple:
-        """Principal moments of inertia about the centre [kg m^2], uniform density."""
-
-    @abstractmethod
-    def pieces(self) -> tuple[tuple[str, dict[str, str], Triple, Triple], ...]:
-        """What URDF can draw: (element, attributes, xyz, rpy) for each piece, in the shape's frame."""
+Piece = tuple[str, str, Triple, Triple]  # URDF element, its attributes, xyz and rpy in the shape's frame
 
 
 @final
 @dataclass(frozen=True)
-class Box(Shape):
+class Shape:
+    """A solid of uniform density around its own centre, axes along its symmetries.
+
+    Attributes:
+        volume: [m^3].
+        moments: principal moments of inertia about the centre for one kilogram (3,) [m^2].
+        pieces: what URDF can draw of it.
+    """
+
+    volume: float
+    moments: Triple
+    pieces: tuple[Piece, ...]
+
+
+def box(x: float, y: float, z: float) -> Shape:
     """Cuboid with edges x, y, z [m]."""
-
-    x: float
-    y: float
-    z: float
-
-    @property
-    def volume(self) -> float:
-        return self.x * self.y * self.z
-
-    def moments(self, mass: float) -> Triple:
-        x2, y2, z2 = self.x**2, self.y**2, self.z**2
-        return (mass * (y2 + z2) / 12, mass * (x2 + z2) / 12, mass * (x2 + y2) / 12)
-
-    def pieces(self) -> tuple[tuple[str, dict[str, str], Triple, Triple], ...]:
-        size = f"{number(self.x)} {number(self.y)} {number(self.z)}"
-        return (("box", {"size": size}, ORIGIN, ORIGIN),)
+    moments = ((y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
+    return Shape(x * y * z, moments, (_box((x, y, z)),))
 
 
-@final
-@dataclass(frozen=True)
-class Cylinder(Shape):
+def cylinder(radius: float, length: float) -> Shape:
     """Full cylinder along z."""
-
-    radius: float
-    length: float
-
-    @property
-    def volume(self) -> float:
-        return pi * self.radius**2 * self.length
-
-    def moments(self, mass: float) -> Triple:
-        across = mass * (3 * self.radius**2 + self.length**2) / 12
-        return (across, across, mass * self.radius**2 / 2)
-
-    def pieces(self) -> tuple[tuple[str, dict[str, str], Triple, Triple], ...]:
-        return (("cylinder", {"radius": number(self.radius), "length": number(self.length)}, ORIGIN, ORIGIN),)
+    across = (3 * radius**2 + length**2) / 12
+    drawn = f'radius="{number(radius)}" length="{number(length)}"'
+    return Shape(
+        pi * radius**2 * length, (across, across, radius**2 / 2), (("cylinder", drawn, ORIGIN, ORIGIN),)
+    )
 
 
-@final
-@dataclass(frozen=True)
-class Sphere(Shape):
+def sphere(radius: float) -> Shape:
     """Full sphere."""
-
-    radius: float
-
-    @property
-    def volume(self) -> float:
-        return 4 / 3 * pi * self.radius**3
-
-    def moments(self, mass: float) -> Triple:
-        each = 2 / 5 * mass * self.radius**2
-        return (each, each, each)
-
-    def pieces(self) -> tuple[tuple[str, dict[str, str], Triple, Triple], ...]:
-        return (("sphere", {"radius": number(self.radius)}, ORIGIN, ORIGIN),)
+    each = 2 / 5 * radius**2
+    drawn = (("sphere", f'radius="{number(radius)}"', ORIGIN, ORIGIN),)
+    return Shape(4 / 3 * pi * radius**3, (each, each, each), drawn)
 
 
-@final
-@dataclass(frozen=True)
-class Capsule(Shape):
+def capsule(radius: float, length: float) -> Shape:
     """Cylinder along z of `length`, closed by two half spheres; drawn as a cylinder and two spheres."""
-
-    radius: float
-    length: float
-
-    @property
-    def volume(self) -> float:
-        return pi * self.radius**2 * (self.length + 4 / 3 * self.radius)
-
-    def moments(self, mass: float) -> Triple:
-        r, h = self.radius, self.length
-        middle = mass * h / (h + 4 / 3 * r)
-        ends = mass - middle
-        # Half spheres: centroid 3/8 r beyond the cylinder's end, own moment 2/5 m r^2 - m (3/8 r)^2 across.
-        across = middle * (3 * r**2 + h**2) / 12
-        across += ends * (2 / 5 * r**2 - (3 / 8 * r) ** 2 + (h / 2 + 3 / 8 * r) ** 2)
-        return (across, across, middle * r**2 / 2 + ends * 2 / 5 * r**2)
-
-    def pieces(self) -> tuple[tuple[str, dict[str, str], Triple, Triple], ...]:
-        half, ball = self.length / 2, {"radius": number(self.radius)}
-        return (
-            ("cylinder", {**ball, "length": number(self.length)}, ORIGIN, ORIGIN),
-            ("sphere", ball, (0.0, 0.0, half), ORIGIN),
-            ("sphere", ball, (0.0, 0.0, -half), ORIGIN),
-        )
+    tube, ball = cylinder(radius, length), sphere(radius)
+    volume = tube.volume + ball.volume
+    ends = ball.volume / volume  # of the mass
+    # Half spheres: centroid 3/8 r beyond the cylinder's end; about it, across, 2/5 r^2 - (3/8 r)^2.
+    end = 2 / 5 * radius**2 - (3 / 8 * radius) ** 2 + (length / 2 + 3 / 8 * radius) ** 2
+    across = (1 - ends) * tube.moments[0] + ends * end
+    along = (1 - ends) * tube.moments[2] + ends * ball.moments[2]
+    element, drawn, _, _ = ball.pieces[0]
+    caps = tuple((element, drawn, (0.0, 0.0, z), ORIGIN) for z in (length / 2, -length / 2))
+    return Shape(volume, (across, across, along), (*tube.pieces, *caps))
 
 
-@final
-@dataclass(frozen=True)
-class Hexagon(Shape):
+def hexagon(radius: float, thickness: float) -> Shape:
     """Regular hexagonal plate, corners at `radius` on +x and every 60 degrees; drawn as three boxes."""
+    along = 5 / 12 * radius**2
+    across = along / 2 + thickness**2 / 12
+    # A box as wide as one side and as long as the distance of two opposite sides covers the two
+    # triangles at those sides; three of them, turned by 60 degrees, cover the hexagon exactly.
+    size = (radius, sqrt(3) * radius, thickness)
+    drawn = tuple(_box(size, k * pi / 3) for k in range(3))
+    return Shape(1.5 * sqrt(3) * radius**2 * thickness, (across, across, along), drawn)
 
-    radius: float
-    thickness: float
 
-    @property
-    def volume(self) -> float:
-        return 1.5 * sqrt(3) * self.radius**2 * self.thickness
-
-    def moments(self, mass: float) -> Triple:
-        flat = mass * 5 / 12 * self.radius**2
-        across = flat / 2 + mass * self.thickness**2 / 12
-        return (across, across, flat)
-
-    def pieces(self) -> tuple[tuple[str, dict[str, str], Triple, Triple], ...]:
-        # A box as wide as one side and as long as the distance of two opposite sides covers the two
-        # triangles at those sides; three of them, turned by 60 degrees, cover the hexagon exactly.
-        size = f"{number(self.radius)} {number(sqrt(3) * self.radius)} {number(self.thickness)}"
-        return tuple(("box", {"size": size}, ORIGIN, (0.0, 0.0, k * pi / 3)) for k in range(3))
+def _box(size: Triple, yaw: float = 0.0) -> Piece:
+    return ("box", f'size="{" ".join(map(number, size))}"', ORIGIN, (0.0, 0.0, yaw))
 
 
 @final
@@ -205,30 +142,33 @@ class Part:
         """Inertia about `point` in the link's axes: R diag(moments) R^T + m (|d|^2 1 - d d^T)."""
         axes = rotation(self.rpy)
         d = np.asarray(self.xyz) - point
-        own = axes @ np.diag(self.shape.moments(mass)) @ axes.T
-        return own + mass * (d @ d * np.eye(3) - np.outer(d, d))
+        own: Array = mass * axes @ np.diag(self.shape.moments) @ axes.T
+        away: Array = mass * (float(d @ d) * np.eye(3) - np.outer(d, d))
+        return own + away
 
-    def placed(self) -> Iterable[tuple[str, dict[str, str], Triple, Triple]]:
+    def placed(self) -> Iterable[Piece]:
         """The shape's pieces with xyz and rpy in the link's frame."""
         axes = rotation(self.rpy)
-        for element, attributes, xyz, rpy in self.shape.pieces():
+        for element, attributes, xyz, rpy in self.shape.pieces:
             x, y, z = np.asarray(self.xyz) + axes @ np.asarray(xyz)
             yield element, attributes, (float(x), float(y), float(z)), angles(axes @ rotation(rpy))
 
 
-def rod(start: Triple, end: Triple, radius: float, material: str = "aluminium", **more: bool | float | None) -> Part:
+def rod(
+    start: Triple, end: Triple, radius: float, material: str = "aluminium", **more: bool | float | None
+) -> Part:
     """A round rod from `start` to `end`, in the link's frame."""
     x, y, z = (b - a for a, b in zip(start, end, strict=True))
     middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2, (start[2] + end[2]) / 2)
     rpy = (0.0, atan2(hypot(x, y), z), atan2(y, x))
-    return Part(Cylinder(radius, sqrt(x * x + y * y + z * z)), middle, rpy, material, **more)  # type: ignore[arg-type]
+    return Part(cylinder(radius, sqrt(x * x + y * y + z * z)), middle, rpy, material, **more)  # type: ignore[arg-type]
 
 
 def block(low: Triple, high: Triple, material: str = "aluminium", **more: bool | float | None) -> Part:
     """A box between two opposite corners, edges along the link's axes."""
     x, y, z = (b - a for a, b in zip(low, high, strict=True))
     middle = ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2)
-    return Part(Box(x, y, z), middle, ORIGIN, material, **more)  # type: ignore[arg-type]
+    return Part(box(x, y, z), middle, ORIGIN, material, **more)  # type: ignore[arg-type]
 
 
 @final
@@ -263,5 +203,4 @@ def inertia_of(parts: Sequence[Part], structure: float = 0.0) -> Inertia:
 
 def number(value: float, digits: int = 12) -> str:
     """A number as text: the same on every machine (last bits of sin and cos are cut off), never '-0'."""
-    text = f"{0.0 if abs(value) < 1e-13 else value:.{digits}g}"
-    return text
+    return f"{0.0 if abs(value) < 1e-13 else value:.{digits}g}"

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import final
 
+import numpy as np
 from shapes import ORIGIN, Part, Triple, inertia_of, number
 
 Rgba = tuple[float, float, float, float]
@@ -48,11 +49,13 @@ class Joint:
     limits: tuple[float, float, float, float] | None = None
 
 
-def urdf(robot: str, note: str, materials: Mapping[str, Rgba], links: Iterable[Link], joints: Iterable[Joint]) -> str:
+def urdf(
+    robot: str, note: str, materials: Mapping[str, Rgba], links: Iterable[Link], joints: Iterable[Joint]
+) -> str:
     """The URDF's text: materials first, then links, then joints, in the order given."""
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<!-- {note} -->", f'<robot name="{robot}">']
     for name, rgba in materials.items():
-        lines.append(f'  <material name="{name}"><color rgba="{" ".join(number(c) for c in rgba)}"/></material>')
+        lines.append(f'  <material name="{name}"><color rgba="{_numbers(rgba)}"/></material>')
     for link in links:
         lines += _link(link)
     for joint in joints:
@@ -61,11 +64,11 @@ def urdf(robot: str, note: str, materials: Mapping[str, Rgba], links: Iterable[L
 
 
 def _origin(xyz: Triple, rpy: Triple) -> str:
-    turn = f' rpy="{_triple(rpy)}"' if any(abs(a) > 1e-12 for a in rpy) else ""
-    return f'<origin xyz="{_triple(xyz)}"{turn}/>'
+    turn = f' rpy="{_numbers(rpy)}"' if any(abs(a) > 1e-12 for a in rpy) else ""
+    return f'<origin xyz="{_numbers(xyz)}"{turn}/>'
 
 
-def _triple(values: Iterable[float]) -> str:
+def _numbers(values: Iterable[float]) -> str:
     return " ".join(number(v) for v in values)
 
 
@@ -73,14 +76,15 @@ def _link(link: Link) -> list[str]:
     if not link.parts:
         return [f'  <link name="{link.name}"/>']
     body = inertia_of(link.parts, link.structure)
-    i = body.about_com
-    moments = {"ixx": i[0, 0], "ixy": i[0, 1], "ixz": i[0, 2], "iyy": i[1, 1], "iyz": i[1, 2], "izz": i[2, 2]}
+    names, (rows, columns) = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), np.triu_indices(3)
+    moments = zip(names, body.about_com[rows, columns], strict=True)
+    inertia = " ".join(f'{name}="{number(round(float(value), 12), 7)}"' for name, value in moments)
     lines = [
         f'  <link name="{link.name}">',
         "    <inertial>",
-        f'      <origin xyz="{_triple(round(float(c), 9) for c in body.com)}"/>',
+        f'      <origin xyz="{_numbers(round(float(c), 9) for c in body.com)}"/>',
         f'      <mass value="{number(body.mass)}"/>',
-        "      <inertia " + " ".join(f'{k}="{number(round(float(v), 12), 7)}"' for k, v in moments.items()) + "/>",
+        f"      <inertia {inertia}/>",
         "    </inertial>",
     ]
     for part in link.parts:
@@ -95,8 +99,8 @@ def _shape(element: str, part: Part) -> list[str]:
     material = f'<material name="{part.material}"/>' if element == "visual" else ""
     lines = []
     for kind, attributes, xyz, rpy in part.placed():
-        text = " ".join(f'{k}="{v}"' for k, v in attributes.items())
-        lines.append(f"    <{element}>{_origin(xyz, rpy)}<geometry><{kind} {text}/></geometry>{material}</{element}>")
+        geometry = f"<geometry><{kind} {attributes}/></geometry>"
+        lines.append(f"    <{element}>{_origin(xyz, rpy)}{geometry}{material}</{element}>")
     return lines
 
 
@@ -108,7 +112,7 @@ def _joint(joint: Joint) -> list[str]:
     ]
     if joint.limits is not None:
         lower, upper, effort, speed = joint.limits
-        lines.append(f'    <axis xyz="{_triple(joint.axis)}"/>')
+        lines.append(f'    <axis xyz="{_numbers(joint.axis)}"/>')
         lines.append(
             f'    <limit lower="{number(lower)}" upper="{number(upper)}"'
             f' effort="{number(effort)}" velocity="{number(speed)}"/>'
@@ -142,17 +146,18 @@ class Semantics:
 def srdf(robot: str, note: str, meaning: Semantics) -> str:
     """The SRDF's text: groups, tips, poses, roles, collision pairs."""
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<!-- {note} -->", f'<robot name="{robot}">']
-    lines.append(f'  <virtual_joint name="root_joint" type="floating" parent_frame="world" child_link="{meaning.root}"/>')
+    floats = 'name="root_joint" type="floating" parent_frame="world"'
+    lines.append(f'  <virtual_joint {floats} child_link="{meaning.root}"/>')
     for limb, joints in meaning.limbs.items():
         lines += _group(limb, (f'<joint name="{j}"/>' for j in joints))
     lines += _group("all", (f'<group name="{limb}"/>' for limb in meaning.limbs))
-    tips = {"feet": ("foot", meaning.feet), "hands": ("tip", meaning.hands)}
-    for group, (_, frames) in tips.items():
-        if frames:
-            lines += _group(group, (f'<link name="{frame}"/>' for frame in frames.values()))
-    for group, (_, frames) in tips.items():
+    tips = {group: frames for group, frames in (("feet", meaning.feet), ("hands", meaning.hands)) if frames}
+    for group, frames in tips.items():
+        lines += _group(group, (f'<link name="{frame}"/>' for frame in frames.values()))
+    for group, frames in tips.items():
         for limb, frame in frames.items():
-            lines.append(f'  <end_effector name="{frame}" parent_link="{frame}" group="{group}" parent_group="{limb}"/>')
+            place = f'parent_link="{frame}" group="{group}" parent_group="{limb}"'
+            lines.append(f'  <end_effector name="{frame}" {place}/>')
     for pose, values in meaning.poses.items():
         lines += _state(pose, "all", values)
     for limb, roles in meaning.roles.items():

@@ -65,9 +65,13 @@ def main(args: Sequence[str] | None = None) -> int:
     if args is None:
         signal.signal(signal.SIGTERM, _terminated)
     try:
-        code = typer.main.get_command(app).main(given, prog_name="wbplan", standalone_mode=False)
+        command = typer.main.get_command(app)  # not .main(): it has exit codes of its own
+        with command.make_context("wbplan", given) as context:
+            command.invoke(context)
         sys.stdout.flush()
-        return code if isinstance(code, int) else DONE
+        return DONE
+    except typer.Exit as leave:  # --help, --version
+        return leave.exit_code
     except typer.TyperException as error:  # bad usage
         hint = f"; see: wbplan {given[0]} --help" if given[0] in _commands() else "; see: wbplan --help"
         return _say(_in_one_line(error) + hint, BAD_INPUT)
@@ -77,7 +81,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return _say(str(error), BROKEN)
     except WbplanError as error:
         return _say(str(error), BAD_INPUT)
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
         return _say("interrupted", INTERRUPTED)
     except BrokenPipeError:  # the reader, `head` say, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains again at exit
@@ -195,11 +199,16 @@ def _commands() -> set[str]:
     return {str(c.name or getattr(c.callback, "__name__", "")) for c in app.registered_commands}
 
 
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError  # rich would leave with exit code 1
+
+
 def _console() -> Console:
     """Standard output; wide enough for the tables where it is a file or a pipe."""
     plain: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}  # brackets are units here
-    console = Console(**plain)
-    return console if console.is_terminal else Console(**plain, width=120)
+    console = _Console(**plain)
+    return console if console.is_terminal else _Console(**plain, width=120)
 
 
 def _in_one_line(error: typer.TyperException) -> str:

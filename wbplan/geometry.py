@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 #: Points nearer to a line than this share of the points' extent count as lying on it.
 FLAT = 1e-10
+#: Coordinates [m] from here on are not those of a polygon: their products would overflow.
+FAR = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +102,12 @@ def support_polygon(points_xy: ArrayLike) -> HalfPlanes:
     points = np.asarray(points_xy, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2:
         raise SpecError(f"support polygon: expected points of shape (P, 2), found {points.shape}")
-    if not np.isfinite(points).all():
-        raise SpecError(f"support polygon: points must be finite, found {_show(points)}")
-    flat = FLAT * _extent(points)
+    if not (np.abs(points) < FAR).all():
+        raise SpecError(
+            f"support polygon: points must be finite (and below {FAR:g} m), found {_show(points)}"
+        )
+    # Far from the origin rounding alone moves points off a line.
+    flat = FLAT * _extent(points) + 4.0 * np.finfo(np.float64).eps * float(np.abs(points).max(initial=0.0))
     if len(points) < 3 or _width(points) <= 2.0 * flat:
         raise SpecError(
             "support polygon: needs three points that are not on one line, "

@@ -63,6 +63,9 @@ class FrameRows:
         motion: (n,) how far the targets themselves move in the step that `advance` took.
         wrench: (n, 6) the w of each row; mask: (n, nv).
         spans: per target, (first position row, count, first rotation row, count).
+        position_targets, position_goal (P, 3), position_error (P, 3): the targets that ask for a position,
+            where it is asked for now, and all three axes of its error; rotation_targets,
+            rotation_goal (R, 3, 3), rotation_error (R, 3) likewise.
     """
 
     def __init__(self, model: Any, targets: Sequence[FrameTarget]) -> None:
@@ -79,9 +82,11 @@ class FrameRows:
         self._body = np.array([slot[t.frame] for t in position], dtype=np.intp)
         self._root = np.array([slot[t.root] for t in position], dtype=np.intp)
         self._slots = [(slot[t.frame], slot[t.root]) for t in rotation]
-        self._goal = np.zeros((count, 3))
-        self._turn_goal = np.tile(np.eye(3), (turns, 1, 1))
+        self.position_goal = np.zeros((count, 3))
+        self.rotation_goal = np.tile(np.eye(3), (turns, 1, 1))
         self._all_error = np.zeros((count + turns, 3))
+        self.position_error, self.rotation_error = self._all_error[:count], self._all_error[count:]
+        self.position_targets, self.rotation_targets = tuple(position), tuple(rotation)
         self._all_motion = np.zeros((count + turns, 3))
         self._all_wrench = np.zeros((count + turns, 3, 6))
         self._flat = self._all_wrench.reshape(-1, 6)
@@ -121,40 +126,40 @@ class FrameRows:
             value = target.path.at(t)
             place, turn = self._place.get(id(target)), self._turn.get(id(target))
             if place is not None:
-                self._goal[place] = value.translation if isinstance(value, pin.SE3) else value
+                self.position_goal[place] = value.translation if isinstance(value, pin.SE3) else value
             if turn is not None:
-                self._turn_goal[turn] = value.rotation if isinstance(value, pin.SE3) else value
+                self.rotation_goal[turn] = value.rotation if isinstance(value, pin.SE3) else value
 
     def advance(self, t: float) -> None:
         """Move the targets on to time `t` [s] and keep how far they went in `motion`."""
         if not self._moving:
             return
-        before, turns_before = self._goal.copy(), self._turn_goal.copy()
+        before, turns_before = self.position_goal.copy(), self.rotation_goal.copy()
         self.aim(t)
         count = len(before)
-        np.subtract(self._goal, before, out=self._all_motion[:count])
+        np.subtract(self.position_goal, before, out=self._all_motion[:count])
         for target in self._moving:
             turn = self._turn.get(id(target))
             if turn is not None:
-                self._all_motion[count + turn] = pin.log3(self._turn_goal[turn] @ turns_before[turn].T)
+                self._all_motion[count + turn] = pin.log3(self.rotation_goal[turn] @ turns_before[turn].T)
         np.take(self._all_motion.reshape(-1), self._chosen, out=self.motion)
 
     def measure(self, kinematics: Kinematics) -> None:
         """Write `error` from the current poses and targets."""
-        count = len(self._goal)
+        count = len(self.position_goal)
         p, r = kinematics.translations, kinematics.rotations
         self._axes = r[self._root].transpose(0, 2, 1)
         self._points = p[self._body]
         offset = self._points - p[self._root]
-        np.subtract(self._goal, (self._axes @ offset[:, :, None])[:, :, 0], out=self._all_error[:count])
+        np.subtract(self.position_goal, (self._axes @ offset[:, :, None])[:, :, 0], out=self._all_error[:count])
         for k, (body, root) in enumerate(self._slots):
             actual = r[root].T @ r[body]
-            self._all_error[count + k] = pin.log3(self._turn_goal[k] @ actual.T)
+            self._all_error[count + k] = pin.log3(self.rotation_goal[k] @ actual.T)
         np.take(self._all_error.reshape(-1), self._chosen, out=self.error)
 
     def write(self, kinematics: Kinematics) -> None:
         """Write `wrench` for the poses that `measure` saw last."""
-        count = len(self._goal)
+        count = len(self.position_goal)
         linear = self._all_wrench[:count]
         linear[:, :, :3] = self._axes
         np.matmul(self._axes, (self._points @ _CROSS).reshape(count, 3, 3), out=linear[:, :, 3:])

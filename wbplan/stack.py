@@ -19,7 +19,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.compiled import CompiledPhase, JointTarget
+from wbplan.compiled import ComTarget, CompiledPhase, JointTarget
 from wbplan.kinematics import Kinematics
 from wbplan.rows import FrameRows
 
@@ -50,6 +50,12 @@ class Posture:
         for j, path in target.paths:
             self.goal[column[j]] = float(path.at(0.0))
         self._moving = [(column[j], path) for j, path in target.paths if not path.constant]
+        self._q_index = 7 + free[6:] - 6
+
+    def next_goal(self, q: Array) -> Array:
+        """(nf - 6,) where the next step should lead: the target, short of the share of the error that stays."""
+        goal: Array = self.goal - (1.0 - self.pull) * (self.goal - self.step - q[self._q_index])
+        return goal
 
     def aim(self, t: float) -> None:
         """Put the target where it is at time `t` [s]."""
@@ -73,6 +79,8 @@ class Stack:
         J: (n, nf) rows in the order: hard frames | soft frames | hard CoM and joints | soft CoM.
         A, b; C, d; H, g; lower, upper: the QP (see the module), lower and upper over the free columns.
         hard_error: (m,) error of the hard rows at the last `measure`.
+        driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick.
+        postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones; hard_joint_goal: their targets.
     """
 
     def __init__(self, phase: CompiledPhase, dt: float) -> None:
@@ -93,12 +101,12 @@ class Stack:
         rows, nf = self.rows, len(self._free)
         hard_com = sum(len(axes) for c, axes in self._coms if c.hard)
         soft_com = sum(len(axes) for c, axes in self._coms if not c.hard)
-        self._hard_joints = [
+        self.hard_joints = [
             (j, path, t.label) for t in self.phase.joint_targets if t.hard for j, path in t.paths if t.weight[j] > 0
         ]
-        self._hard_joint_goal = np.array([float(path.at(0.0)) for _, path, _ in self._hard_joints])
-        self._hard_joint_step = np.zeros(len(self._hard_joints))
-        self.n_hard = rows.hard_rows + hard_com + len(self._hard_joints)
+        self.hard_joint_goal = np.array([float(path.at(0.0)) for _, path, _ in self.hard_joints])
+        self._hard_joint_step = np.zeros(len(self.hard_joints))
+        self.n_hard = rows.hard_rows + hard_com + len(self.hard_joints)
         n_soft = len(rows.error) - rows.hard_rows + soft_com
         self.A, self.b = np.zeros((self.n_hard, nf)), np.zeros(self.n_hard)
         self._soft, self._soft_rhs = np.zeros((n_soft, nf)), np.zeros(n_soft)
@@ -140,8 +148,8 @@ class Stack:
     def _diagonal(self) -> None:
         """What never changes on the diagonal, and the posture tasks' share of it."""
         self._base_diagonal = np.full(len(self._free), REGULARISATION + self.phase.damping)
-        self._postures = [Posture(t, self._free, self.dt) for t in self.phase.joint_targets if not t.hard]
-        for posture in self._postures:
+        self.postures = [Posture(t, self._free, self.dt) for t in self.phase.joint_targets if not t.hard]
+        for posture in self.postures:
             self._base_diagonal[6:] += posture.stiffness
 
     # -- each tick -----------------------------------------------------------------------------------
@@ -162,8 +170,8 @@ class Stack:
             else:
                 self._soft_error[at_soft : at_soft + len(axes)] = error
                 at_soft += len(axes)
-        for i, (joint, _, _) in enumerate(self._hard_joints):
-            self.hard_error[at_hard + i] = self._hard_joint_goal[i] - q[7 + joint]
+        for i, (joint, _, _) in enumerate(self.hard_joints):
+            self.hard_error[at_hard + i] = self.hard_joint_goal[i] - q[7 + joint]
 
     @property
     def margin(self) -> float:
@@ -183,9 +191,9 @@ class Stack:
         self.rows.aim(t, every=True)
         for k, (com, _) in enumerate(self._coms):
             self._com_goal[k] = np.array(com.path.at(t), dtype=float)
-        for i, (_, path, _) in enumerate(self._hard_joints):
-            self._hard_joint_goal[i] = float(path.at(t))
-        for posture in self._postures:
+        for i, (_, path, _) in enumerate(self.hard_joints):
+            self.hard_joint_goal[i] = float(path.at(t))
+        for posture in self.postures:
             posture.aim(t)
 
     def advance(self, t: float) -> None:
@@ -195,10 +203,10 @@ class Stack:
             goal = np.array(com.path.at(t), dtype=float)
             self._com_step[k] = goal - self._com_goal[k]
             self._com_goal[k] = goal
-        for i, (_, path, _) in enumerate(self._hard_joints):
+        for i, (_, path, _) in enumerate(self.hard_joints):
             value = float(path.at(t))
-            self._hard_joint_step[i], self._hard_joint_goal[i] = value - self._hard_joint_goal[i], value
-        for posture in self._postures:
+            self._hard_joint_step[i], self.hard_joint_goal[i] = value - self.hard_joint_goal[i], value
+        for posture in self.postures:
             posture.advance(t)
         if self._driving:
             q = self.kinematics.q
@@ -229,7 +237,7 @@ class Stack:
         self._limits()
 
     def _com_rows(self, at_hard: int, at_soft: int) -> None:
-        if not self._coms and not self._hard_joints:
+        if not self._coms and not self.hard_joints:
             return
         J = self.kinematics.com_jacobian
         for k, (com, axes) in enumerate(self._coms):
@@ -243,25 +251,39 @@ class Stack:
                 at_hard += len(axes)
             else:
                 at_soft += len(axes)
-        for i, (joint, _, _) in enumerate(self._hard_joints):
+        for i, (joint, _, _) in enumerate(self.hard_joints):
             self.A[at_hard + i, np.searchsorted(self._free, 6 + joint)] = 1.0
             self.b[at_hard + i] += self._hard_joint_step[i]
 
     def _cost(self) -> None:
         np.multiply(self._soft, self._weight[:, None], out=self._weighted)
         np.matmul(self._weighted.T, self._weighted, out=self.H)
-        diagonal = self._base_diagonal + float(np.abs(self._soft_error) @ self._curvature)
-        self.H.reshape(-1)[self._diag] += diagonal
+        self.H.reshape(-1)[self._diag] += self._base_diagonal + self._curvature_damping()
         np.matmul(self._weighted.T, self._weight * self._soft_rhs, out=self.g)
         np.negative(self.g, out=self.g)
-        q = self.kinematics.q[self._q_index]
-        for posture in self._postures:
-            self.g[6:] -= posture.stiffness * (posture.pull * (posture.goal - posture.step - q) + posture.step)
+        for posture in self.postures:
+            self.g[6:] -= posture.stiffness * (posture.next_goal(self.kinematics.q) - self.kinematics.q[self._q_index])
 
-    def _limits(self) -> None:
+    def _curvature_damping(self) -> float:
+        return float(np.abs(self._soft_error) @ self._curvature)
+
+    def diagonal_damping(self) -> float:
+        """What stands on the whole diagonal of H: regularisation, damping tasks and curvature damping."""
+        return REGULARISATION + self.phase.damping + self._curvature_damping()
+
+    def com_goal(self, target: ComTarget) -> tuple[Array, Array]:
+        """Where a CoM task's target is now [m], and how far it moved in the last `advance`."""
+        k = next(k for k, (com, _) in enumerate(self._coms) if com is target)
+        return self._com_goal[k], self._com_step[k]
+
+    def fill_box(self) -> None:
+        """Fill lower and upper for the current configuration."""
         q = self.kinematics.q[self._q_index]
         np.clip(self._q_lower - q, -self._reach, self._reach, out=self.lower[6:])
         np.clip(self._q_upper - q, -self._reach, self._reach, out=self.upper[6:])
+
+    def _limits(self) -> None:
+        self.fill_box()
         polygon, limit = self.phase.polygon, self.phase.phase.support
         if polygon is None or limit is None:
             return
@@ -297,7 +319,7 @@ class Stack:
         for com, axes in self._coms:
             if com.hard:
                 names += [(com.label, "m")] * len(axes)
-        return names + [(label, "rad") for _, _, label in self._hard_joints]
+        return names + [(label, "rad") for _, _, label in self.hard_joints]
 
     def edge_names(self) -> list[str]:
         """Name of every support-polygon row: the two feet that its edge joins."""
@@ -324,10 +346,10 @@ class Stack:
             error = (self._com_goal[k] - self.kinematics.com)[axes]
             found[f"{com.label}.position"] = float(np.linalg.norm(error))
         q = self.kinematics.q
-        for posture in self._postures:
+        for posture in self.postures:
             gap = (posture.goal - q[self._q_index])[posture.stiffness > 0]
             found[f"{posture.label}.joints"] = float(np.linalg.norm(gap))
-        for i, (joint, _, label) in enumerate(self._hard_joints):
-            found[f"{label}.joints"] = float(np.hypot(found.get(f"{label}.joints", 0.0), self._hard_joint_goal[i] - q[7 + joint]))
+        for i, (joint, _, label) in enumerate(self.hard_joints):
+            found[f"{label}.joints"] = float(np.hypot(found.get(f"{label}.joints", 0.0), self.hard_joint_goal[i] - q[7 + joint]))
         return found
 

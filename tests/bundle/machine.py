@@ -59,7 +59,9 @@ def urdf(*, tray: str = "revolute", speed: float = 8.0) -> str:
             f'<link name="leg{i}_foot"/>',
             _joint(f"leg{i}_joint1", "revolute", "base", f"leg{i}_hip", f"{x} {y} 0", "1 0 0", speed),
             _joint(f"leg{i}_joint2", "revolute", f"leg{i}_hip", f"leg{i}_thigh", "0 0 0", "0 1 0", speed),
-            _joint(f"leg{i}_joint3", "revolute", f"leg{i}_thigh", f"leg{i}_shank", "0 0 -0.15", "0 1 0", speed),
+            _joint(
+                f"leg{i}_joint3", "revolute", f"leg{i}_thigh", f"leg{i}_shank", "0 0 -0.15", "0 1 0", speed
+            ),
             _joint(f"leg{i}_sole", "fixed", f"leg{i}_shank", f"leg{i}_foot", "0 0 -0.15", "0 0 1", speed),
         ]
     parts += [
@@ -178,7 +180,12 @@ def _set_angle(model: Any, q: np.ndarray, name: str, angle: float) -> None:
 
 
 def assemble(
-    model: Any, robot: str, time: np.ndarray, q: np.ndarray, promises: list[dict[str, Any]], plan: dict[str, Any]
+    model: Any,
+    robot: str,
+    time: np.ndarray,
+    q: np.ndarray,
+    promises: list[dict[str, Any]],
+    plan: dict[str, Any],
 ) -> Bundle:
     """Everything that is recorded beside q."""
     v = np.zeros((len(time), model.nv))
@@ -199,7 +206,7 @@ def assemble(
             box[k] = pin.SE3ToXYZQUAT(held)
         com[k] = np.average(points, axis=0, weights=masses)
         feet = [data.oMf[model.getFrameId(c["frame"])].translation[:2].copy() for c in phase["contacts"]]
-        if i not in anchors and len(feet) > 2:
+        if i not in anchors and len(np.unique(feet, axis=0)) > 2:
             anchors[i] = support_polygon(phase.get("region", feet))
         if i in anchors:
             margin[k] = anchors[i].margin(com[k, :2])

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from rich.console import Console
 
@@ -133,7 +133,9 @@ def quaternion_long(machine: ModuleType, good: Bundle) -> Bundle:
 
 def drifting_foot(amount: float) -> Callable[[ModuleType, Bundle], Bundle]:
     def drifting(machine: ModuleType, good: Bundle) -> Bundle:
-        return machine.build(foot=lambda t: machine.foot_path(t) + [amount * machine.blend((t - 0.8) / 0.6), 0, 0])
+        return machine.build(
+            foot=lambda t: machine.foot_path(t) + [amount * machine.blend((t - 0.8) / 0.6), 0, 0]
+        )
 
     return drifting
 
@@ -341,39 +343,49 @@ def test_a_wall_holds_nothing_that_the_feet_do_not(machine: ModuleType) -> None:
 # ------------------------------------------------------------------------------------------------ tampering
 
 
+@pytest.fixture(scope="module")
+def plan(good: Bundle) -> Callable[[], Bundle]:
+    """Gives the good plan: Hypothesis would print all of its numbers."""
+    return lambda: good
+
+
 @given(
     sample=st.integers(0, 70),
     joint=st.integers(0, 12),
     amount=st.floats(1e-3, 3.0).flatmap(lambda x: st.sampled_from([x, -x])),
 )
 def test_a_joint_value_that_was_changed_is_seen(
-    machine: ModuleType, good: Bundle, sample: int, joint: int, amount: float
+    machine: ModuleType, plan: Callable[[], Bundle], sample: int, joint: int, amount: float
 ) -> None:
+    good = plan()
     q = good.trajectory.q.copy()
     q[sample, 7 + joint] += amount
     found = broken(machine.edited(good, q=q))
     assert "v agrees with q" in found
 
 
-@given(sample=st.integers(0, 70), leg=st.integers(0, 11), amount=st.floats(1e-2, 0.1))
+@given(sample=st.integers(0, 70), leg=st.integers(0, 11), amount=st.floats(1e-3, 0.1))
 def test_changing_v_along_with_q_does_not_hide_it(
-    machine: ModuleType, good: Bundle, sample: int, leg: int, amount: float
+    machine: ModuleType, plan: Callable[[], Bundle], sample: int, leg: int, amount: float
 ) -> None:
+    good = plan()
+    assume(leg > 2 or not 20 < sample < 40)  # leg 1 swings: it may be anywhere
     q, motion = good.trajectory.q.copy(), good.trajectory
     q[sample, 7 + leg] += amount
-    forged = machine.assemble(
-        good.model, good.urdf, motion.time, q, copy.deepcopy(good.phases), {"joint_acceleration": [500.0] * 13}
-    )
-    assert broken(forged)
+    forged = machine.assemble(good.model, good.urdf, motion.time, q, copy.deepcopy(good.phases), {})
+    assert "foot slip" in broken(forged)
 
 
-@given(index=st.tuples(st.integers(0, 70), st.integers(0, 19)), value=st.sampled_from([0.0, 1e9, -1e300, 1e308]))
+@given(
+    index=st.tuples(st.integers(0, 70), st.integers(0, 19)), value=st.sampled_from([0.0, 1e9, -1e300, 1e308])
+)
 def test_absurd_values_make_broken_rows_and_no_crash(
-    machine: ModuleType, good: Bundle, index: tuple[int, int], value: float
+    machine: ModuleType, plan: Callable[[], Bundle], index: tuple[int, int], value: float
 ) -> None:
+    good = plan()
     q = machine.changed(good.trajectory.q, index, value)
     report = check(machine.edited(good, q=q))
-    assert not report.ok or value == good.trajectory.q[index]
+    assert not report.ok or abs(value - good.trajectory.q[index]) < 1e-3
 
 
 def test_a_zero_quaternion_breaks_rows_and_does_not_crash(machine: ModuleType, good: Bundle) -> None:

@@ -16,22 +16,30 @@ SWAY = '''"""Sway: the body moves sideways on six feet.
 Source: none, a task for tests.
 """
 
+import numpy as np
+
 import wbplan as wb
 
 ROBOT = "legarm_hexapod"
 
 
 def script(
-    robot, *, sway: float = 0.01, duration: float = 0.2, feet: int = 6, name: str = "sway", axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    robot,
+    *,
+    sway: float = 0.01,
+    duration: float = 0.2,
+    feet: int = 6,
+    name: str = "sway",
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0),
 ) -> wb.Script:
     stand = robot.state("stand")
     contacts = [wb.Contact(foot, friction=0.7) for foot in list(robot.feet.values())[:feet]]
-    goal = stand.com + sway * __import__("numpy").array(axis)
+    aside = wb.MinJerk(stand.com, stand.com + sway * np.array(axis), duration=duration)
     return wb.Script(
         wb.Phase(
             name,
             contacts=contacts,
-            soft=[wb.ComTask(wb.MinJerk(stand.com, goal, duration=duration), weight=20.0), wb.PostureTask(weight=0.1)],
+            soft=[wb.ComTask(aside, weight=20.0), wb.PostureTask(weight=0.1)],
             limits=[wb.JointLimits(), wb.SupportPolygon(margin=0.02)],
             duration=duration,
         )

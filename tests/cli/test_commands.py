@@ -7,6 +7,7 @@ import shutil
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 import wbplan as wb
 
 Refused = Callable[..., str]
+Call = Callable[..., Any]
 
 FILES = ["plan.json", "plots.png", "robot.urdf", "scene.html", "trajectory.csv", "trajectory.npz"]
 
@@ -34,7 +36,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_list_names_tasks_and_robots(wbplan) -> None:
+def test_list_names_tasks_and_robots(wbplan: Call) -> None:
     ran = wbplan("list")
     assert ran.code == 0
     lines = ran.out.splitlines()
@@ -42,13 +44,13 @@ def test_list_names_tasks_and_robots(wbplan) -> None:
     assert [line for line in lines if line.split()[:1] == ["legarm_hexapod"]]
 
 
-def test_list_of_a_task_names_its_parameters(wbplan) -> None:
+def test_list_of_a_task_names_its_parameters(wbplan: Call) -> None:
     ran = wbplan("list", "clamp")
     assert ran.code == 0
     assert "mass=0.8 (float)" in ran.out
 
 
-def test_help_and_version(wbplan) -> None:
+def test_help_and_version(wbplan: Call) -> None:
     for args in ([], ["--help"], ["run", "--help"]):
         ran = wbplan(*args)
         assert ran.code == 0
@@ -57,7 +59,7 @@ def test_help_and_version(wbplan) -> None:
 
 
 @pytest.mark.parametrize("backend", ["proxqp", "placo"])
-def test_run_plans_checks_and_writes(backend: str, wbplan, tmp_path: Path) -> None:
+def test_run_plans_checks_and_writes(backend: str, wbplan: Call, tmp_path: Path) -> None:
     ran = wbplan(
         "run", "sway.py", "--backend", backend, "--dt", "0.02", "--set", "sway=0.02", "--set", "name=lean"
     )
@@ -73,20 +75,20 @@ def test_run_plans_checks_and_writes(backend: str, wbplan, tmp_path: Path) -> No
     assert wbplan("check", "out/sway").code == 0
 
 
-def test_run_replaces_a_bundle(wbplan, tmp_path: Path) -> None:
+def test_run_replaces_a_bundle(wbplan: Call, tmp_path: Path) -> None:
     assert wbplan("run", "sway.py", "--out", "here").code == 0
     assert wbplan("run", "sway.py", "--out", "here", "--dt", "0.05").code == 0
     assert json.loads((tmp_path / "here" / "plan.json").read_text(encoding="utf-8"))["dt"] == 0.05
     assert sorted(p.name for p in tmp_path.iterdir()) == ["here", "sway.py"]
 
 
-def test_check_of_what_holds(wbplan, bundle: Path) -> None:
+def test_check_of_what_holds(wbplan: Call, bundle: Path) -> None:
     ran = wbplan("check", str(bundle))
     assert (ran.code, ran.err) == (0, "")
     assert "holds" in ran.out
 
 
-def test_check_finds_one_changed_joint_value(wbplan, bundle: Path, tmp_path: Path) -> None:
+def test_check_finds_one_changed_joint_value(wbplan: Call, bundle: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(bundle, tmp_path / "tampered")
     arrays = dict(np.load(folder / "trajectory.npz"))
     arrays["q"][3, 9] += 0.01
@@ -98,7 +100,7 @@ def test_check_finds_one_changed_joint_value(wbplan, bundle: Path, tmp_path: Pat
     assert "Traceback" not in ran.err
 
 
-def test_robot_summary(wbplan) -> None:
+def test_robot_summary(wbplan: Call) -> None:
     ran = wbplan("robot", "legarm_hexapod")
     assert ran.code == 0
     for part in (
@@ -114,8 +116,11 @@ def test_robot_summary(wbplan) -> None:
         assert part in ran.out
 
 
-def test_every_problem_of_a_robot_is_listed(wbplan, tmp_path: Path) -> None:
-    link = '<link name="{}"><inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="{}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+def test_every_problem_of_a_robot_is_listed(wbplan: Call, tmp_path: Path) -> None:
+    link = (
+        '<link name="{}"><inertial><mass value="{}"/>'
+        '<inertia ixx="1" iyy="1" izz="{}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    )
     joint = (
         '<joint name="knee" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
         '<limit lower="1" upper="-1" effort="1" velocity="1"/></joint>'
@@ -134,7 +139,7 @@ def test_every_problem_of_a_robot_is_listed(wbplan, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "not xml", "<robot/>"])
-def test_an_empty_or_broken_urdf(text: str, wbplan, tmp_path: Path) -> None:
+def test_an_empty_or_broken_urdf(text: str, wbplan: Call, tmp_path: Path) -> None:
     (tmp_path / "bad.urdf").write_text(text, encoding="utf-8")
     ran = wbplan("robot", "bad.urdf")
     assert ran.code == 2
@@ -142,7 +147,7 @@ def test_an_empty_or_broken_urdf(text: str, wbplan, tmp_path: Path) -> None:
     assert "Traceback" not in ran.err
 
 
-def test_contradicting_hard_tasks_are_named(wbplan, tmp_path: Path) -> None:
+def test_contradicting_hard_tasks_are_named(wbplan: Call, tmp_path: Path) -> None:
     (tmp_path / "torn.py").write_text(
         '"""Torn."""\n'
         "import wbplan as wb\n"

@@ -122,6 +122,7 @@ def test_inset_refuses_a_negative_margin() -> None:
         [(0.0, 0.0), (1.0, 2.5), (1.0, 2.5)],
         [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (0.5, 0.5)],
         [(1.0, 1.0)] * 4,
+        [(1e12, 0.0), (1e12, 1e-4), (1e12 + 1e-4, 0.0)],
     ],
 )
 def test_points_without_area_are_refused_by_name(points: list[tuple[float, float]]) -> None:
@@ -134,7 +135,13 @@ def test_points_without_area_are_refused_by_name(points: list[tuple[float, float
 
 
 @pytest.mark.parametrize(
-    "points", [[(0.0, 0.0), (1.0, np.nan), (0.0, 1.0)], [(0.0, 0.0, 0.0)] * 3, [1.0, 2.0, 3.0]]
+    "points",
+    [
+        [(0.0, 0.0), (1.0, np.nan), (0.0, 1.0)],
+        [(0.0, 0.0), (1e308, 0.0), (0.0, 1.0)],
+        [(0.0, 0.0, 0.0)] * 3,
+        [1.0, 2.0, 3.0],
+    ],
 )
 def test_points_that_are_no_points_are_refused(points) -> None:
     with pytest.raises(SpecError, match="support polygon"):

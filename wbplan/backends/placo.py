@@ -1,6 +1,301 @@
-"""stub"""
-from wbplan.stack import Stack
+"""PlaCo's C++ kinematics solver behind the same specifications.
+
+PlaCo owns its robot and tasks, so a phase is told to it once, and each tick only moves its targets. What
+it does not have is made up for here:
+
+- a carried body is a link of the URDF that it gets, so that tasks, mass and CoM see it;
+- it has no gain, so a soft target is put where the gained step leads;
+- it has one weight a task, squared weights, and masks: a task of unequal weights becomes several;
+- its polygon must be clockwise, and one that is not is "infeasible" without a word;
+- hard rows that depend on each other make it throw. Those of such rows that are not contacts are given to it
+  as soft ones of a weight above all others, and the tick's own correction then puts them in full.
+"""
+
+from __future__ import annotations
+
+from typing import Any, final
+
+import numpy as np
+import pinocchio as pin
+import placo
+from lxml import etree
+from numpy.typing import NDArray
+
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
+from wbplan.diagnose import solve_error
+from wbplan.errors import SolveError, SpecError
+from wbplan.qp import Solution
+from wbplan.stack import MARGIN_RESERVE, REGULARISATION, Stack
+
+Array = NDArray[np.float64]
+
+#: Hard rows whose smallest singular value is below this share of the largest count as dependent.
+DEPENDENT = 1e-3
+
+#: Weight, against squared weights of soft tasks, of a hard task that PlaCo cannot take as hard.
+HEAVY = 1e7
+
+
+@final
 class PlacoBackend:
+    """See the module."""
+
     name = "placo"
+
     def __init__(self, stack: Stack) -> None:
-        raise NotImplementedError
+        self._stack = stack
+        phase = stack.phase
+        flags = int(placo.Flags.ignore_collisions)
+        self._robot = placo.RobotWrapper("", flags, _urdf_with_carried(phase))
+        names = list(self._robot.model.names)[2:]
+        if names != list(phase.robot.joint_names):
+            raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
+        self._soft_labels: set[str] = set()
+        self._build()
+
+    # -- once a phase ------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        """A solver with the phase's tasks and limits."""
+        stack, phase = self._stack, self._stack.phase
+        self._robot.state.q = stack.kinematics.q
+        self._robot.update_kinematics()
+        self._soft_labels |= _dependent(stack)
+        solver = self._solver = placo.KinematicsSolver(self._robot)
+        solver.dt = stack.dt
+        self._position_tasks = [self._frame_tasks(t, rotation=False) for t in stack.rows.position_targets]
+        self._rotation_tasks = [self._frame_tasks(t, rotation=True) for t in stack.rows.rotation_targets]
+        rows = stack.rows
+        pull = lambda t: 1.0 if t.hard else 1.0 - float(np.exp(-t.gain * stack.dt))  # noqa: E731
+        self._position_lag = np.array([[1.0 - pull(t)] for t in rows.position_targets]).reshape(-1, 1)
+        self._rotation_lag = [1.0 - pull(t) for t in rows.rotation_targets]
+        self._regularisation = solver.add_regularization_task(REGULARISATION + phase.damping)
+        self._joints_given()
+        self._com_tasks()
+        self._posture_tasks()
+        self._limits()
+
+    def _priority(self, label: str, hard: bool, weight: float) -> tuple[str, float]:
+        if not hard:
+            return "soft", weight**2
+        return ("soft", HEAVY) if label in self._soft_labels else ("hard", 1.0)
+
+    def _frame_tasks(self, target: FrameTarget, *, rotation: bool) -> list[Any]:
+        """One PlaCo task for each distinct weight among the axes."""
+        names = [f.name for f in self._stack.phase.model.frames]
+        frame, solver = names[target.frame], self._solver
+        weights = target.rotation_weight if rotation else target.position_weight
+        tasks = []
+        for weight in sorted(set(weights[weights > 0])):
+            axes = "".join(axis for axis, w in zip("xyz", weights, strict=True) if w == weight)
+            if target.root == WORLD:
+                task = (
+                    solver.add_orientation_task(frame, np.eye(3))
+                    if rotation
+                    else solver.add_position_task(frame, np.zeros(3))
+                )
+            else:
+                root = names[target.root]
+                task = (
+                    solver.add_relative_orientation_task(root, frame, np.eye(3))
+                    if rotation
+                    else solver.add_relative_position_task(root, frame, np.zeros(3))
+                )
+            if axes != "xyz":
+                task.mask.set_axises(axes, "task")
+            part = "rotation" if rotation else "position"
+            task.configure(f"{target.label} {part} {axes}", *self._priority(target.label, target.hard, weight))
+            tasks.append(task)
+        return tasks
+
+    def _joints_given(self) -> None:
+        """Joints that are not the QP's: masked where they rest, hard where they move."""
+        names = self._stack.phase.robot.joint_names
+        self._driven = []
+        for k, driven in enumerate(self._stack.phase.driven):
+            name = names[driven.joint]
+            if driven.path.constant:
+                self._solver.mask_dof(name)
+            else:
+                task = self._solver.add_joints_task()
+                task.set_joint(name, float(self._stack.kinematics.q[7 + driven.joint]))
+                task.configure(f"driven {name}", "hard", 1.0)
+                self._driven.append((k, 7 + driven.joint, name, task))
+
+    def _com_tasks(self) -> None:
+        self._coms = []
+        for target in self._stack.phase.com_targets:
+            lag = 0.0 if target.hard else float(np.exp(-target.gain * self._stack.dt))
+            for weight in sorted(set(target.weight[target.weight > 0])):
+                axes = "".join(axis for axis, w in zip("xyz", target.weight, strict=True) if w == weight)
+                task = self._solver.add_com_task(np.zeros(3))
+                if axes != "xyz":
+                    task.mask.set_axises(axes, "task")
+                task.configure(f"{target.label} {axes}", *self._priority(target.label, target.hard, weight))
+                self._coms.append((task, target, lag))
+
+    def _posture_tasks(self) -> None:
+        """One PlaCo task for each distinct weight among the joints; hard ones each by itself."""
+        stack = self._stack
+        names, q = stack.phase.robot.joint_names, stack.kinematics.q
+        free = stack.phase.free[6:] - 6
+        self._postures = []
+        for posture in stack.postures:
+            for square in sorted(set(posture.stiffness[posture.stiffness > 0])):
+                task = self._solver.add_joints_task()
+                joints = [(int(k), names[free[k]]) for k in np.flatnonzero(posture.stiffness == square)]
+                for k, name in joints:
+                    task.set_joint(name, float(q[7 + free[k]]))
+                task.configure(f"{posture.label} {square}", "soft", square)
+                self._postures.append((task, joints, posture))
+        self._hard_joints = []
+        for joint, _, label in stack.hard_joints:
+            task = self._solver.add_joints_task()
+            task.set_joint(names[joint], float(q[7 + joint]))
+            task.configure(f"{label} {names[joint]}", *self._priority(label, True, 1.0))
+            self._hard_joints.append((task, names[joint]))
+
+    def _limits(self) -> None:
+        stack, solver, robot = self._stack, self._solver, self._robot
+        phase = stack.phase
+        limits = phase.phase.joint_limits
+        solver.enable_joint_limits(limits is not None)
+        solver.enable_velocity_limits(limits is not None)
+        if limits is not None:
+            for joint, speed in zip(phase.robot.joint_names, phase.model.velocityLimit[6:], strict=True):
+                robot.set_velocity_limit(joint, float(limits.speed * speed))
+            self._widened: set[int] = set()
+            self._admit_outsiders()
+        self._polygon = None
+        if phase.polygon is not None and phase.phase.support is not None:
+            clockwise = [np.array(vertex) for vertex in phase.polygon.vertices[::-1]]
+            self._polygon = solver.add_com_polygon_constraint(clockwise, self._margin())
+            self._polygon.configure("support polygon", "hard", 1.0)
+
+    def _admit_outsiders(self) -> None:
+        """A joint outside its limits may stay as far out as a tick at full speed leaves it, and no farther."""
+        model, q, dt = self._stack.phase.model, self._stack.kinematics.q, self._stack.dt
+        low, high = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
+        outside = set(np.flatnonzero((q[7:] < low) | (q[7:] > high)).tolist())
+        limits = self._stack.phase.phase.joint_limits
+        for j in outside | self._widened:
+            reach = (limits.speed if limits else 1.0) * model.velocityLimit[6 + j] * dt * (1 - 1e-6)
+            lo = low[j] if q[7 + j] >= low[j] else min(low[j], q[7 + j] + reach)
+            hi = high[j] if q[7 + j] <= high[j] else max(high[j], q[7 + j] - reach)
+            self._robot.set_joint_limits(self._stack.phase.robot.joint_names[j], float(lo), float(hi))
+        self._widened = outside
+
+    def _margin(self) -> float:
+        """The margin to ask for in this tick: less than promised while the CoM comes from outside."""
+        stack = self._stack
+        support = stack.phase.phase.support
+        if support is None:
+            return 0.0
+        wanted = support.margin + MARGIN_RESERVE
+        return min(wanted, stack.margin + support.recovery_speed * stack.dt)
+
+    # -- each tick ---------------------------------------------------------------------------------------
+
+    def solve(self) -> Solution:
+        """See `Backend.solve`."""
+        try:
+            step = self._solve()
+        except RuntimeError:
+            self._soft_labels |= _dependent(self._stack)
+            self._build()
+            try:
+                step = self._solve()
+            except RuntimeError as error:
+                self._stack.assemble()
+                raise solve_error(self._stack, f"PlaCo finds no step ({_one_line(error)})") from None
+        if not np.isfinite(step).all():
+            raise SolveError(f"phase '{self._stack.phase.phase.name}': PlaCo's step is not finite")
+        return Solution(step)
+
+    def _solve(self) -> Array:
+        stack, robot = self._stack, self._robot
+        robot.state.q = stack.kinematics.q
+        robot.update_kinematics()
+        self._aim()
+        step: Array = self._solver.solve(False)
+        step[stack.driven] = stack.driven_step
+        stack.fill_box()
+        free = stack.phase.free
+        step[free] = np.clip(step[free], stack.lower, stack.upper)
+        return step
+
+    def _aim(self) -> None:
+        """Put every target where this tick's step should lead."""
+        stack, rows = self._stack, self._stack.rows
+        goals = rows.position_goal - self._position_lag * rows.position_error
+        for tasks, target, goal in zip(self._position_tasks, rows.position_targets, goals, strict=True):
+            for task in tasks:
+                if target.root == WORLD:
+                    task.target_world = goal
+                else:
+                    task.target = goal
+        for k, (tasks, target) in enumerate(zip(self._rotation_tasks, rows.rotation_targets, strict=True)):
+            rotation = rows.rotation_goal[k]
+            if self._rotation_lag[k] > 0.0:
+                rotation = pin.exp3(-self._rotation_lag[k] * rows.rotation_error[k]) @ rotation
+            for task in tasks:
+                if target.root == WORLD:
+                    task.R_world_frame = rotation
+                else:
+                    task.R_a_b = rotation
+        q = stack.kinematics.q
+        for k, j, name, task in self._driven:
+            task.set_joint(name, float(q[j] + stack.driven_step[k]))
+        for task, com, lag in self._coms:
+            goal, motion = stack.com_goal(com)
+            task.target_world = goal - lag * (goal - motion - stack.kinematics.com)
+        for task, joints, posture in self._postures:
+            goals = posture.next_goal(q)
+            for k, name in joints:
+                task.set_joint(name, float(goals[k]))
+        for (task, name), goal in zip(self._hard_joints, stack.hard_joint_goal, strict=True):
+            task.set_joint(name, float(goal))
+        self._regularisation.set_weight(stack.diagonal_damping())
+        if self._polygon is not None:
+            self._polygon.margin = self._margin()
+        if self._widened:
+            self._admit_outsiders()
+
+
+def _dependent(stack: Stack) -> set[str]:
+    """Labels of hard rows, contacts left out, that depend on the others at the current configuration."""
+    if stack.n_hard == 0:
+        return set()
+    stack.assemble()
+    left, singular, _ = np.linalg.svd(stack.A, full_matrices=True)
+    rank = int((singular > DEPENDENT * singular[0]).sum())
+    share = np.abs(left[:, rank:]).max(axis=1, initial=0.0)
+    names = stack.hard_names()
+    found = {names[k][0] for k in np.flatnonzero(share > 1e-3)}
+    return {label for label in found if not label.startswith("contact(")}
+
+
+def _urdf_with_carried(phase: CompiledPhase) -> str:
+    """The URDF without its looks, and with each carried body as a link fixed to its holder."""
+    root = etree.fromstring(phase.robot.urdf_text.encode(), etree.XMLParser(resolve_entities=False))
+    for element in [e for e in root.iter("visual", "collision")]:
+        element.getparent().remove(element)
+    for held in phase.held:
+        xyz = " ".join(repr(float(x)) for x in held.T_holder_body.translation)
+        rpy = " ".join(repr(float(x)) for x in pin.rpy.matrixToRpy(held.T_holder_body.rotation))
+        com = " ".join(repr(x) for x in held.body.com)
+        name = held.body.name
+        link = etree.SubElement(root, "link", name=name)
+        inertial = etree.SubElement(link, "inertial")
+        etree.SubElement(inertial, "origin", xyz=com, rpy="0 0 0")
+        etree.SubElement(inertial, "mass", value=repr(float(held.body.mass)))
+        etree.SubElement(inertial, "inertia", ixx="1e-3", iyy="1e-3", izz="1e-3", ixy="0", ixz="0", iyz="0")
+        joint = etree.SubElement(root, "joint", name=f"{name}_held", type="fixed")
+        etree.SubElement(joint, "parent", link=held.holder)
+        etree.SubElement(joint, "child", link=name)
+        etree.SubElement(joint, "origin", xyz=xyz, rpy=rpy)
+    return str(etree.tostring(root, encoding="unicode"))
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120]

@@ -17,7 +17,7 @@ from wbplan.errors import BundleError
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """The planned motion, sampled; SI units, N samples.
 
@@ -49,8 +49,11 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        return f"Trajectory({len(self)} samples, {len(self.joint_names)} joints, {self.time[-1]:g} s)"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Bundle:
     """A plan: what was promised, the robot it was planned with, and the motion.
 
@@ -63,6 +66,9 @@ class Bundle:
     plan: Mapping[str, Any]
     trajectory: Trajectory
     urdf: str
+
+    def __repr__(self) -> str:
+        return f"Bundle({self.plan.get('task')!r} on {self.plan.get('robot')!r}, {self.trajectory!r})"
 
     @property
     def phases(self) -> list[dict[str, Any]]:

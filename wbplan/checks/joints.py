@@ -88,7 +88,9 @@ def _speeds(replay: Replay) -> list[Row]:
     excess = np.abs(replay.step[:, 6:]) - replay.model.velocityLimit[6:]
     worst = Worst("joint beyond speed limit", "rad/s", slack=1e-6)
     names = replay.record.joint_names
-    worst.see(excess, 0.0, replay.record.time[:-1], replay.phase_names, names, _units(replay.model, names, "/s"))
+    worst.see(
+        excess, 0.0, replay.record.time[:-1], replay.phase_names, names, _units(replay.model, names, "/s")
+    )
     return worst.rows()
 
 

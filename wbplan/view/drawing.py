@@ -32,9 +32,9 @@ def grade(margin: ArrayLike, required: ArrayLike = 0.0) -> NDArray[np.int64]:
 
 #: The eye's distance, about, in radii of what is seen.
 VIEW_DISTANCE = 2.5
-#: Half the width and height that what is seen may take in the picture, at a distance of 1: about four
-#: fifths of it, where the page's camera opens 36 degrees upright, and 8 : 5.
-PICTURE = np.array([1.6, 1.0]) * np.tan(np.radians(18.0)) * 0.8
+#: Half the width and height that what is seen may take in the picture, at a distance of 1: about nine
+#: tenths of it, where the page's camera opens 36 degrees upright, and 8 : 5.
+PICTURE = np.array([1.6, 1.0]) * np.tan(np.radians(18.0)) * 0.88
 #: Names of the grades.
 GRADES = ("clear", "near", "broken")
 

@@ -30,8 +30,7 @@ def still_page(title: str, messages: Iterable[bytes]) -> str:
         messages: the scene, as `Store.messages` gives it.
     """
     block = b"".join(struct.pack(">I", len(message)) + message for message in messages)
-    # mtime=0: the same scene gives the same file.
-    packed = base64.b64encode(gzip.compress(block, 9, mtime=0)).decode("ascii")
+    packed = base64.b64encode(gzip.compress(block, 9)).decode("ascii")
     return _page(title, f'playEmbedded("{packed}");')
 
 

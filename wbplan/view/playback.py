@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -125,7 +126,8 @@ def write_html(bundle: Bundle, path: str | Path, *, package_dirs: Sequence[str |
     except OSError as error:
         raise ViewError(f"view: {goal} cannot be written: {error.strerror or error}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            part.unlink()
 
 
 def inline(bundle: Bundle, *, height: int = 520, package_dirs: Sequence[str | Path] = ()) -> Any:
@@ -139,11 +141,13 @@ def inline(bundle: Bundle, *, height: int = 520, package_dirs: Sequence[str | Pa
     Returns:
         An `IPython.display.HTML`.
     """
+    from IPython import display
+
     text = html.escape(page(bundle, package_dirs=package_dirs), quote=True)
     style = f"width: 100%; height: {int(height)}px; border: 0; border-radius: 8px"
-    return HTML(
-        f'<div><iframe srcdoc="{text}" style="{style}" title="{html.escape(_title(bundle))}"></iframe></div>'
-    )
+    title = html.escape(_title(bundle))
+    show: Any = display.HTML
+    return show(f'<div><iframe srcdoc="{text}" style="{style}" title="{title}"></iframe></div>')
 
 
 def draw_plan(bundle: Bundle, target: Window, *, package_dirs: Sequence[str | Path] = ()) -> None:
@@ -320,7 +324,7 @@ class _Playback:
 
     def _posed(self, path: str, poses: Array) -> Array:
         """A node at poses (N, 7), hidden where they are not known; returns those that are."""
-        known: Bools = np.isfinite(poses).all(axis=1)
+        known: Bools = np.isfinite(poses.sum(axis=1))
         if known.any():
             held = poses[np.maximum.accumulate(np.where(known, np.arange(len(poses)), int(np.argmax(known))))]
             self._moving(path, held[:, :3], held[:, 3:])
