@@ -10,6 +10,7 @@ the same time law, so that a path of equal end points never swings around them.
 from __future__ import annotations
 
 import abc
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, final
@@ -243,10 +244,16 @@ class Waypoints(Path):
             rows = np.array([np.concatenate([p.translation, w]) for p, w in zip(self.points, turns, strict=True)])
         else:
             rows = np.array(self.points)
-        spline = CubicSpline(np.array(self.times), rows, bc_type="clamped")
+        curve = CubicSpline(np.array(self.times), rows, bc_type="clamped")
+        pieces = [tuple(curve.c[:, i]) for i in range(len(self.times) - 1)]
+        knots = self.times
 
         def at(t: float) -> Value:
-            row = spline(min(max(t, 0.0), end))
+            t = min(max(t, 0.0), end)
+            piece = min(bisect_right(knots, t), len(pieces)) - 1
+            a, b, c, d = pieces[piece]
+            s = t - knots[piece]
+            row = ((a * s + b) * s + c) * s + d
             if isinstance(first, pin.SE3):
                 return pin.SE3(first.rotation @ pin.exp3(row[3:]), row[:3])
             return row

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,9 +27,8 @@ def print_plan(bundle: Bundle, console: Console) -> None:
     if set_to:
         console.print(f"  {set_to}")
     console.print(_phases(bundle))
+    console.print(_tasks(bundle))
     report: Mapping[str, Any] = plan["report"]
-    for name, value in report.get("worst", {}).items():
-        console.print(f"  worst {name}: {_value(value)}")
     planning, motion = float(report["seconds_planning"]), float(report["seconds_motion"])
     faster = f", {motion / planning:.1f} times faster than it moves" if planning > 0.0 else ""
     console.print(f"  planned in {planning:.2f} s for {motion:.2f} s of motion{faster}")
@@ -56,44 +55,48 @@ def print_robot(robot: Robot, console: Console) -> None:
 
 
 def _phases(bundle: Bundle) -> Table:
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("phase")
-    for heading in (
-        "start [s]",
-        "end [s]",
-        "feet",
-        "margin [mm]",
-        "promised",
-        "position [mm]",
-        "rotation [deg]",
-    ):
-        table.add_column(heading, justify="right")
+    """When each phase was, on how many feet, and its least margin beside the promised one."""
+    table = _table("phase", "start [s]", "end [s]", "feet", "margin [mm]", "promised")
     motion = bundle.trajectory
     for number, phase in enumerate(bundle.phases):
         margins = motion.margin[motion.phase == number]
+        margins = margins[np.isfinite(margins)]
         promised = phase.get("margin")
         table.add_row(
             phase["name"],
             f"{phase['start']:.2f}",
             f"{phase['end']:.2f}",
             str(len(phase["contacts"])),
-            _worst(-margins, -1e3),
+            f"{1e3 * margins.min():.1f}" if margins.size else "",
             "" if promised is None or promised <= NO_MARGIN else f"{1e3 * promised:.1f}",
-            _worst(_errors(phase["tasks"], "position"), 1e3),
-            _worst(_errors(phase["tasks"], "orientation"), 180.0 / np.pi),
         )
     return table
 
 
-def _errors(tasks: Sequence[Mapping[str, Any]], kind: str) -> list[float]:
-    """The worst errors of a phase's hard tasks; soft ones may rightly be far off."""
-    return [task[kind] for task in tasks if task.get("hard") and task.get(kind) is not None]
+def _tasks(bundle: Bundle) -> Table:
+    """The worst error of each task over the whole plan; hard ones first, soft ones may rightly be far off."""
+    table = _table("worst error of", "", "position [mm]", "rotation [deg]")
+    worst: dict[tuple[bool, str], dict[str, float]] = {}
+    for phase in bundle.phases:
+        for task in phase["tasks"]:
+            row = worst.setdefault((not task.get("hard", False), task["name"]), {})
+            for kind in ("position", "orientation"):
+                if task.get(kind) is not None:
+                    row[kind] = max(row.get(kind, 0.0), task[kind])
+    scales = {"position": 1e3, "orientation": 180.0 / np.pi}
+    for (soft, name), row in sorted(worst.items(), key=lambda item: item[0][0]):
+        if row:
+            shown = [f"{scale * row[kind]:.3g}" if kind in row else "" for kind, scale in scales.items()]
+            table.add_row(name, "soft" if soft else "hard", *shown)
+    return table
 
 
-def _worst(values: Any, scale: float) -> str:
-    finite = np.asarray(values, dtype=np.float64)
-    finite = finite[np.isfinite(finite)]
-    return f"{scale * finite.max():.3g}" if finite.size else ""
+def _table(first: str, *others: str) -> Table:
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column(first)
+    for heading in others:
+        table.add_column(heading, justify="right")
+    return table
 
 
 def _value(value: Any) -> str:

@@ -79,9 +79,12 @@ class FrameRows:
         self._turn = {id(t): k for k, t in enumerate(rotation)}
         self._layout(model, len(position))
         count, turns = len(position), len(rotation)
+        self._world = slot[WORLD]
         self._body = np.array([slot[t.frame] for t in position], dtype=np.intp)
-        self._root = np.array([slot[t.root] for t in position], dtype=np.intp)
-        self._slots = [(slot[t.frame], slot[t.root]) for t in rotation]
+        self._relative_places = [
+            (k, slot[t.frame], slot[t.root]) for k, t in enumerate(position) if t.root != WORLD
+        ]
+        self._turns = [(k, slot[t.frame], slot[t.root]) for k, t in enumerate(rotation)]
         self.position_goal = np.zeros((count, 3))
         self.rotation_goal = np.tile(np.eye(3), (turns, 1, 1))
         self._all_error = np.zeros((count + turns, 3))
@@ -90,6 +93,10 @@ class FrameRows:
         self._all_motion = np.zeros((count + turns, 3))
         self._all_wrench = np.zeros((count + turns, 3, 6))
         self._flat = self._all_wrench.reshape(-1, 6)
+        self._linear = self._all_wrench[:count]
+        self._linear[:, :, :3] = np.eye(3)
+        self._points, self._moment = np.zeros((count, 3)), np.zeros((count, 9))
+        self._relative_moment = np.zeros((3, 3))
         self._moving = [t for t in targets if not t.path.constant]
         self.live = any(t.path.live for t in targets)
         self.aim(0.0, every=True)
@@ -134,39 +141,47 @@ class FrameRows:
         """Move the targets on to time `t` [s] and keep how far they went in `motion`."""
         if not self._moving:
             return
-        before, turns_before = self.position_goal.copy(), self.rotation_goal.copy()
-        self.aim(t)
-        count = len(before)
-        np.subtract(self.position_goal, before, out=self._all_motion[:count])
+        count = len(self.position_goal)
         for target in self._moving:
-            turn = self._turn.get(id(target))
+            value = target.path.at(t)
+            place, turn = self._place.get(id(target)), self._turn.get(id(target))
+            if place is not None:
+                goal = value.translation if isinstance(value, pin.SE3) else value
+                np.subtract(goal, self.position_goal[place], out=self._all_motion[place])
+                self.position_goal[place] = goal
             if turn is not None:
-                self._all_motion[count + turn] = pin.log3(self.rotation_goal[turn] @ turns_before[turn].T)
-        np.take(self._all_motion.reshape(-1), self._chosen, out=self.motion)
+                goal = value.rotation if isinstance(value, pin.SE3) else value
+                self._all_motion[count + turn] = pin.log3(goal @ self.rotation_goal[turn].T)
+                self.rotation_goal[turn] = goal
+        self._all_motion.take(self._chosen, out=self.motion)
 
     def measure(self, kinematics: Kinematics) -> None:
         """Write `error` from the current poses and targets."""
-        count = len(self.position_goal)
         p, r = kinematics.translations, kinematics.rotations
-        self._axes = r[self._root].transpose(0, 2, 1)
-        self._points = p[self._body]
-        offset = self._points - p[self._root]
-        np.subtract(self.position_goal, (self._axes @ offset[:, :, None])[:, :, 0], out=self._all_error[:count])
-        for k, (body, root) in enumerate(self._slots):
-            actual = r[root].T @ r[body]
-            self._all_error[count + k] = pin.log3(self.rotation_goal[k] @ actual.T)
-        np.take(self._all_error.reshape(-1), self._chosen, out=self.error)
+        p.take(self._body, axis=0, out=self._points)
+        np.subtract(self.position_goal, self._points, out=self.position_error)
+        for k, body, root in self._relative_places:
+            offset = r[root].T @ (p[body] - p[root])
+            np.subtract(self.position_goal[k], offset, out=self.position_error[k])
+        for k, body, root in self._turns:
+            actual = r[body] if root == self._world else r[root].T @ r[body]
+            self.rotation_error[k] = pin.log3(self.rotation_goal[k] @ actual.T)
+        self._all_error.take(self._chosen, out=self.error)
 
     def write(self, kinematics: Kinematics) -> None:
         """Write `wrench` for the poses that `measure` saw last."""
         count = len(self.position_goal)
-        linear = self._all_wrench[:count]
-        linear[:, :, :3] = self._axes
-        np.matmul(self._axes, (self._points @ _CROSS).reshape(count, 3, 3), out=linear[:, :, 3:])
-        for k, (_, root) in enumerate(self._slots):
+        np.matmul(self._points, _CROSS, out=self._moment)
+        for k, _, root in self._relative_places:
             axes = kinematics.rotations[root].T
-            error = self._all_error[count + k]
-            if np.abs(error).max() > _SMALL_TURN:
+            self._linear[k, :, :3] = axes
+            np.matmul(axes, self._moment[k].reshape(3, 3), out=self._relative_moment)
+            self._moment[k] = self._relative_moment.reshape(9)
+        self._linear[:, :, 3:] = self._moment.reshape(count, 3, 3)
+        for k, _, root in self._turns:
+            axes = kinematics.rotations[root].T
+            error = self.rotation_error[k]
+            if error.dot(error) > _SMALL_TURN**2:
                 axes = pin.Jlog3(pin.exp3(error)) @ axes
             self._all_wrench[count + k, :, 3:] = axes
-        np.take(self._flat, self._chosen, axis=0, out=self.wrench)
+        self._flat.take(self._chosen, axis=0, out=self.wrench)

@@ -120,13 +120,14 @@ class Stack:
         self._pull = 1.0 - np.exp(-np.concatenate(gains) * self.dt)
         self._curvature = self._weight**2 * self._pull
         self._weighted = np.zeros((n_soft, nf))
+        self._weight_column, self._minus_weight = self._weight[:, None], -self._weight
         self.hard_error = np.zeros(self.n_hard)
         self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
         edges = 0 if self.phase.polygon is None else len(self.phase.polygon.offsets)
         self.C, self.d = np.zeros((edges, nf)), np.zeros(edges)
         self._J = np.zeros((6, nf))
         self._W = np.zeros((len(rows.error), nf))
-        self._diag = np.arange(nf) * (nf + 1)
+        self._H_diagonal = self.H.reshape(-1)[:: nf + 1]
         self._com_goal = [np.array(c.path.at(0.0), dtype=float) for c, _ in self._coms]
         self._com_step = [np.zeros(3) for _ in self._coms]
         self.driven_step = np.zeros(len(self.driven))
@@ -140,10 +141,12 @@ class Stack:
         self._q_lower, self._q_upper = np.full(nf - 6, -np.inf), np.full(nf - 6, np.inf)
         self._reach = np.full(nf - 6, np.inf)
         self.lower, self.upper = np.full(nf, -1e20), np.full(nf, 1e20)
+        self._lower, self._upper = self.lower[6:], self.upper[6:]
         if limits is not None:
             self._q_lower = np.array(model.lowerPositionLimit)[self._q_index]
             self._q_upper = np.array(model.upperPositionLimit)[self._q_index]
             self._reach = limits.speed * np.array(model.velocityLimit)[free[6:]] * self.dt
+        self._back = -self._reach
 
     def _diagonal(self) -> None:
         """What never changes on the diagonal, and the posture tasks' share of it."""
@@ -218,12 +221,11 @@ class Stack:
         kin, rows = self.kinematics, self.rows
         kin.differentiate()
         rows.write(kin)
-        np.take(kin.jacobian, self._free, axis=1, out=self._J)
-        np.matmul(rows.wrench, self._J, out=self._W)
-        self._W *= self._mask
+        kin.jacobian.take(self._free, axis=1, out=self._J)
         hard, soft = rows.hard_rows, len(rows.error) - rows.hard_rows
-        self.A[:hard] = self._W[:hard]
-        self._soft[:soft] = self._W[hard:]
+        np.matmul(rows.wrench, self._J, out=self._W)
+        np.multiply(self._W[:hard], self._mask[:hard], out=self.A[:hard])
+        np.multiply(self._W[hard:], self._mask[hard:], out=self._soft[:soft])
         self.b[:] = self.hard_error
         self.b[:hard] += rows.motion[:hard]
         np.multiply(self._pull, self._soft_error, out=self._soft_rhs)
@@ -256,11 +258,10 @@ class Stack:
             self.b[at_hard + i] += self._hard_joint_step[i]
 
     def _cost(self) -> None:
-        np.multiply(self._soft, self._weight[:, None], out=self._weighted)
+        np.multiply(self._soft, self._weight_column, out=self._weighted)
         np.matmul(self._weighted.T, self._weighted, out=self.H)
-        self.H.reshape(-1)[self._diag] += self._base_diagonal + self._curvature_damping()
-        np.matmul(self._weighted.T, self._weight * self._soft_rhs, out=self.g)
-        np.negative(self.g, out=self.g)
+        self._H_diagonal += self._base_diagonal + self._curvature_damping()
+        np.matmul(self._weighted.T, self._minus_weight * self._soft_rhs, out=self.g)
         for posture in self.postures:
             self.g[6:] -= posture.stiffness * (posture.next_goal(self.kinematics.q) - self.kinematics.q[self._q_index])
 
@@ -279,8 +280,10 @@ class Stack:
     def fill_box(self) -> None:
         """Fill lower and upper for the current configuration."""
         q = self.kinematics.q[self._q_index]
-        np.clip(self._q_lower - q, -self._reach, self._reach, out=self.lower[6:])
-        np.clip(self._q_upper - q, -self._reach, self._reach, out=self.upper[6:])
+        for bound, into in ((self._q_lower, self._lower), (self._q_upper, self._upper)):
+            np.subtract(bound, q, out=into)
+            np.minimum(into, self._reach, out=into)
+            np.maximum(into, self._back, out=into)
 
     def _limits(self) -> None:
         self.fill_box()
@@ -289,7 +292,7 @@ class Stack:
             return
         kin = self.kinematics
         J = kin.com_jacobian[:2]
-        np.matmul(polygon.normals, J[:, self._free], out=self.C)
+        np.matmul(polygon.normals, J.take(self._free, axis=1), out=self.C)
         room = polygon.offsets - polygon.normals @ kin.com[:2] - (limit.margin + MARGIN_RESERVE)
         np.maximum(room, -limit.recovery_speed * self.dt, out=self.d)
         if self._driving:

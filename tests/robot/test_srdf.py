@@ -67,6 +67,19 @@ def test_dialects_of_other_tools(loaded):
     assert any("'other'" in warning and "left_hip" in warning for warning in robot.warnings)
 
 
+def test_a_group_with_a_tip_is_a_limb_even_if_a_smaller_group_is_part_of_it(make, loaded):
+    robot = loaded(
+        make.srdf.replace(
+            '<group name="all">', '<group name="hip"><joint name="left_hip"/></group><group name="all">'
+        )
+    )
+    assert robot.limbs == {
+        "left": ("left_hip", "left_knee"),
+        "right": ("right_hip", "right_knee"),
+        "hip": ("left_hip",),
+    }
+
+
 def test_every_problem_is_listed(make, refused):
     srdf = (
         make.srdf.replace('<joint name="left_hip"/>', '<joint name="left_hop"/>')

@@ -41,6 +41,13 @@ def test_feet_of_arms_do_not_count(robot):
     assert height(state, "left_foot") == pytest.approx(0.4 - 0.8)
 
 
+def test_a_limb_in_neither_role_has_no_foot_to_stand_on(robot):
+    neutral = robot.state("neutral")
+    assert robot.role_of("left", neutral.q) is None
+    assert robot.standing_feet(neutral.q) == ("right_foot",)
+    assert height(neutral, "right_foot") == pytest.approx(0, abs=1e-12)
+
+
 def test_roles_hold_within_a_millionth(robot):
     q = np.array(robot.state("stand").q)
     index = robot.joint_index("left_knee")[0]
@@ -118,7 +125,7 @@ def test_a_rounded_quaternion_is_normalised(robot):
 def test_nothing_from_outside_changes_a_state(robot):
     q = np.array(robot.state("stand").q)
     state = State(robot.model, q)
-    before = (state.q.copy(), state.com, state.pose("left_foot").homogeneous)
+    before = (state.q.copy(), state.com.copy(), state.pose("left_foot").homogeneous)
     q[:3] = 9
     state.com[:] = 9
     pose = state.pose("left_foot")

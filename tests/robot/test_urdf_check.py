@@ -156,6 +156,15 @@ def test_joint_types(make, kind, word):
     only(pair(make, kind=kind), "joint 'j': ", word)
 
 
+def test_what_pinocchios_parser_insists_on(make):
+    only(pair(make, more="<dynamics/>"), "joint 'j': its dynamics has neither damping nor friction")
+    only(pair(make, more="<safety_controller/>"), "joint 'j': safety_controller k_velocity is missing")
+    lid = make.link("lid") + make.joint("f", "body", "lid", kind="fixed", more='<limit effort="0"/>')
+    parts = [make.link("body"), make.link("arm"), make.joint("j", "body", "arm"), lid]
+    only(make.robot(*parts), "joint 'f': limit velocity is missing")
+    assert problems(make.robot(*parts).replace('effort="0"', 'effort="0" velocity="0"')) == []
+
+
 def test_mimic(make):
     only(pair(make, more='<mimic joint="j"/>'), "joint 'j': mimic joints are not supported")
 
@@ -272,6 +281,18 @@ def test_load_refuses_a_missing_mesh_and_takes_package_dirs(make, write, tmp_pat
     (tmp_path / "lib" / "pkg" / "a.stl").write_text("solid")
     robot = load_robot(path, package_dirs=[tmp_path / "lib"])
     assert robot.mesh_path("package://pkg/a.stl") == (tmp_path / "lib" / "pkg" / "a.stl").resolve()
+
+
+def test_colours_do_no_harm_and_make_no_noise(make, write, capfd):
+    visual = '<visual><geometry><sphere radius="1"/></geometry><material/></visual>'
+    text = make.robot("<material/>", make.link("body", make.inertial() + visual), make.leg("leg", 1, 0))
+    assert load_robot(write(text)).urdf_text == text
+    assert capfd.readouterr() == ("", "")
+    found = problems(text.replace("<material/>", '<material name="m"><color rgba="1 1 1"/></material>'))
+    assert found == [
+        "material 'm': color rgba is '1 1 1', expected 4 finite numbers",
+        "link 'body' visual: color rgba is '1 1 1', expected 4 finite numbers",
+    ]
 
 
 def test_every_problem_is_in_one_error(make, write, capfd):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from wbplan.errors import ModelError
 from wbplan.robot import load_robot, problems
 
 SIZES = st.tuples(*[st.floats(0.01, 2.0)] * 3)
@@ -143,3 +145,61 @@ def test_one_number_spoiled_is_found_with_its_element(parts, where, what):
     element = {"l": f"link 'l{index}'", "j": f"joint 'j{index}'", "robot": "robot: "}[kind]
     assert found
     assert all(problem.startswith(element) for problem in found)
+
+
+@pytest.mark.parametrize("kind", ["urdf", "srdf"])
+@given(data=st.data())
+@settings(
+    max_examples=150,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+def test_a_spoiled_file_loads_or_is_refused_but_nothing_else(make, folder, capfd, kind, data):
+    texts = {"urdf": make.biped(), "srdf": make.srdf}
+    root = ElementTree.fromstring(texts[kind])
+    for _ in range(data.draw(st.integers(1, 3))):
+        element = data.draw(st.sampled_from(list(root.iter())))
+        how = data.draw(st.sampled_from(["set", "delete", "remove", "repeat", "rename"]))
+        if how in ("set", "delete") and element.attrib:
+            key = data.draw(st.sampled_from(sorted(element.attrib)))
+            if how == "delete":
+                del element.attrib[key]
+            else:
+                words = [
+                    "",
+                    " ",
+                    "nan",
+                    "-1",
+                    "0",
+                    "1e400",
+                    "1 2",
+                    "x",
+                    "body",
+                    "left",
+                    "feet",
+                    "left_foot",
+                    "left_hip",
+                ]
+                element.set(key, data.draw(st.sampled_from(words)))
+        elif how in ("remove", "repeat") and len(element):
+            child = data.draw(st.sampled_from(list(element)))
+            if how == "remove":
+                element.remove(child)
+            else:
+                element.append(child)
+        elif how == "rename":
+            element.tag = data.draw(st.sampled_from(["link", "joint", "group", "limit", "mesh", "other"]))
+    texts[kind] = ElementTree.tostring(root, encoding="unicode")
+    for suffix, text in texts.items():
+        (folder / f"spoiled.{suffix}").write_text(text)
+    refused: tuple[str, ...] = ()
+    try:
+        robot = load_robot(folder / "spoiled.urdf")
+    except ModelError as error:
+        refused = error.problems or ("",)
+    else:
+        for pose in robot.pose_names:
+            assert np.isfinite(robot.state(pose).q).all()
+    # The checks come before Pinocchio's parser and see all that it would stumble over.
+    assert all(line and "Pinocchio" not in line for line in refused)
+    assert capfd.readouterr() == ("", "")

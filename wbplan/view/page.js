@@ -42,7 +42,7 @@ function aim() {
                     target[1] + distance * (0.55 * back[1] - 0.6 * back[0]), target[2] + distance * 1.5);
   lamp.target.position.set(target[0], target[1], target[2]);
   const half = distance * 0.5;
-  lamp.shadow.normalBias = distance * 0.002;
+  lamp.shadow.normalBias = distance * 0.0008;
   Object.assign(lamp.shadow.camera, {left: -half, right: half, top: half, bottom: -half,
                                      near: distance * 0.2, far: distance * 4});
   lamp.shadow.camera.updateProjectionMatrix();

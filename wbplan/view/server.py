@@ -16,7 +16,6 @@ from typing import Any, Self
 
 import meshcat
 from tornado.httpserver import HTTPServer
-from tornado.netutil import bind_sockets
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
@@ -53,9 +52,9 @@ class Server:
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int | None = None, *, title: str = "wbplan") -> None:
-        sockets = _bind(host, port)
+        listener = _bind(host, port)
         self.host = host
-        self.port: int = sockets[0].getsockname()[1]
+        self.port: int = listener.getsockname()[1]
         self.url = f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
         self.visualizer: meshcat.Visualizer = visualizer(self)
         self._page = live_page(title)
@@ -66,7 +65,7 @@ class Server:
         self._stopping = False
         self._started = threading.Event()
         self._thread = threading.Thread(
-            target=lambda: asyncio.run(self._serve(sockets)), name=f"wbplan-view-{self.port}", daemon=True
+            target=lambda: asyncio.run(self._serve(listener)), name=f"wbplan-view-{self.port}", daemon=True
         )
         self._thread.start()
         if not self._started.wait(10.0):
@@ -119,7 +118,7 @@ class Server:
 
     # What follows runs in the server's own thread.
 
-    async def _serve(self, sockets: list[socket.socket]) -> None:
+    async def _serve(self, listener: socket.socket) -> None:
         self._loop = asyncio.get_running_loop()
         self._stopped = asyncio.Event()
         app = Application(
@@ -130,7 +129,7 @@ class Server:
             log_function=lambda handler: None,
         )
         http = HTTPServer(app)
-        http.add_sockets(sockets)
+        http.add_socket(listener)
         self._started.set()
         await self._stopped.wait()
         http.stop()
@@ -199,23 +198,26 @@ class _Socket(WebSocketHandler):  # type: ignore[misc]
             sent.exception()  # a page that went away in between is no error; asking marks it as seen
 
 
-def _bind(host: str, port: int | None) -> list[socket.socket]:
-    """Listening sockets on one address: the port asked for, or the first free one."""
+def _bind(host: str, port: int | None) -> socket.socket:
+    """A listening socket on one address: at the port asked for, or the first free one."""
     if port is not None and not 0 < port < 65536:
         raise ViewError(f"view: port has to be from 1 to 65535, found {port}; leave it out for a free one")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for wanted in [port] if port is not None else [*PORTS, 0]:
         try:
-            sockets: list[socket.socket] = bind_sockets(wanted, address=host)
-            return sockets
+            listener = socket.create_server((host, wanted), family=family, backlog=64)
         except (OSError, UnicodeError) as error:
             if port is None and getattr(error, "errno", None) == errno.EADDRINUSE:
                 continue
             raise _refusal(host, wanted, error) from error
+        listener.setblocking(False)
+        return listener
     raise ViewError(f"view: no free port on {host}")
 
 
 def _refusal(host: str, port: int | None, error: Exception) -> ViewError:
     number = getattr(error, "errno", None)
+    reason = getattr(error, "strerror", None) or error
     if number == errno.EADDRINUSE:
         return ViewError(
             f"view: port {port} on {host} is taken by another program; choose another port, or give none for "
@@ -226,6 +228,6 @@ def _refusal(host: str, port: int | None, error: Exception) -> ViewError:
             f"view: port {port} on {host} may not be used by this account; choose one above 1023"
         )
     return ViewError(
-        f"view: host '{host}' cannot be listened on ({error}); it has to be an address of this machine, "
+        f"view: host '{host}' cannot be listened on ({reason}); it has to be an address of this machine, "
         "for example 127.0.0.1"
     )
