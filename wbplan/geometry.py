@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 #: Points nearer to a line than this share of the points' extent count as lying on it.
 FLAT = 1e-10
+EPSILON = float(np.finfo(np.float64).eps)
 #: Coordinates [m] from here on are not those of a polygon: their products would overflow.
 FAR = 1e100
 
@@ -107,7 +108,7 @@ def support_polygon(points_xy: ArrayLike) -> HalfPlanes:
             f"support polygon: points must be finite (and below {FAR:g} m), found {_show(points)}"
         )
     # Far from the origin rounding alone moves points off a line.
-    flat = FLAT * _extent(points) + 4.0 * np.finfo(np.float64).eps * float(np.abs(points).max(initial=0.0))
+    flat = FLAT * _extent(points) + 4.0 * EPSILON * float(np.abs(points).max(initial=0.0))
     if len(points) < 3 or _width(points) <= 2.0 * flat:
         raise SpecError(
             "support polygon: needs three points that are not on one line, "

@@ -62,7 +62,8 @@ def figure(bundle: Bundle) -> Figure:
             return _png(self)
 
     drawing = Plan(figsize=SIZE, dpi=DPI, layout="constrained", facecolor="white")
-    drawing.get_layout_engine().set(w_pad=0.06, h_pad=0.05)  # type: ignore[union-attr]
+    engine: Any = drawing.get_layout_engine()
+    engine.set(w_pad=0.06, h_pad=0.05)
     columns = drawing.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
     left = columns[0].subgridspec(3, 1, height_ratios=[3.0, 1.0, 1.0])
     joints = len(bundle.trajectory.joint_names)
@@ -84,7 +85,8 @@ def _png(drawing: Figure) -> bytes:
 
     file = io.BytesIO()
     # Without the version in it the same plan makes the same file.
-    FigureCanvasAgg(drawing).print_png(file, metadata={"Software": None})
+    canvas: Any = FigureCanvasAgg(drawing)
+    canvas.print_png(file, metadata={"Software": None})
     return file.getvalue()
 
 
@@ -99,7 +101,9 @@ def _polygons(bundle: Bundle) -> Iterator[tuple[dict[str, Any], Array, HalfPlane
         first = int(np.argmin(np.abs(motion.time - phase["start"])))
         pin.framesForwardKinematics(model, data, motion.q[first])
         names = [contact["frame"] for contact in phase["contacts"]]
-        feet = np.array([data.oMf[model.getFrameId(name)].translation.copy() for name in names]).reshape(-1, 3)
+        feet = np.array([data.oMf[model.getFrameId(name)].translation.copy() for name in names]).reshape(
+            -1, 3
+        )
         try:
             yield phase, feet, support_polygon(phase.get("region", feet[:, :2]))
         except SpecError:
@@ -126,23 +130,33 @@ def _top_view(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
             continue
         drawn.add(key)
         color = colormaps[TIME](clock(phase["start"]))
-        axes.fill(*polygon.vertices.T, facecolor=(*color[:3], 0.05), edgecolor=(*color[:3], 0.8), linewidth=1.2)
-        inset = polygon.inset(phase["margin"]) if phase["margin"] > 0.0 else []
-        if len(inset):
-            axes.fill(*inset.T, facecolor="none", edgecolor=(*color[:3], 0.7), linewidth=0.9, linestyle=(0, (4, 3)))
+        axes.fill(
+            *polygon.vertices.T, facecolor=(*color[:3], 0.05), edgecolor=(*color[:3], 0.8), linewidth=1.2
+        )
+        inset = polygon.inset(max(phase["margin"], 0.0))
+        if phase["margin"] > 0.0 and len(inset):
+            axes.fill(
+                *inset.T, facecolor="none", edgecolor=(*color[:3], 0.7), linewidth=0.9, linestyle=(0, (4, 3))
+            )
     axes.plot([], [], color=FAINT, linewidth=1.2, label="support polygon, by phase")
     axes.plot([], [], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), label="promised margin inside it")
     _feet(axes, named)
     path = motion.com[:, :2]
-    pieces = LineCollection(list(np.stack([path[:-1], path[1:]], axis=1)), cmap=TIME, norm=clock, linewidths=2.6)
+    pieces = LineCollection(
+        list(np.stack([path[:-1], path[1:]], axis=1)), cmap=TIME, norm=clock, linewidths=2.6
+    )
     pieces.set_array(motion.time[:-1])
     pieces.set_capstyle("round")
     pieces.set_zorder(4)
     axes.add_collection(pieces)
-    axes.plot(*path[0], "o", color="white", markeredgecolor=INK, markersize=9, zorder=5, label="CoM at the start")
-    axes.plot(*path[-1], "s", color=INK, markeredgecolor="white", markersize=8, zorder=6, label="CoM at the end")
+    axes.plot(
+        *path[0], "o", color="white", markeredgecolor=INK, markersize=9, zorder=5, label="CoM at the start"
+    )
+    axes.plot(
+        *path[-1], "s", color=INK, markeredgecolor="white", markersize=8, zorder=6, label="CoM at the end"
+    )
     axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.14)
+    axes.margins(x=0.2, y=0.14)  # room for the feet's names
     axes.grid(color="#eceff1", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.set(xlabel="x [m]", ylabel="y [m]")
@@ -169,8 +183,8 @@ def _feet(axes: Axes, named: list[tuple[str, Array]]) -> None:
         away = away / max(float(np.linalg.norm(away)), 1e-9)
         axes.annotate(
             name.removesuffix("_foot"),
-            spot[:2],
-            xytext=tuple(9.0 * away),
+            (float(spot[0]), float(spot[1])),
+            xytext=(9.0 * float(away[0]), 9.0 * float(away[1])),
             textcoords="offset points",
             ha="center" if abs(away[0]) < 0.4 else ("left" if away[0] > 0 else "right"),
             va="center" if abs(away[1]) < 0.4 else ("bottom" if away[1] > 0 else "top"),
@@ -187,11 +201,15 @@ def _margin(axes: Axes, bundle: Bundle) -> None:
     for phase in bundle.phases:
         if phase["margin"] > 0.1 * NO_MARGIN:
             span, bound = (phase["start"], phase["end"]), phase["margin"]
-            axes.plot(span, (bound, bound), color=BOUND, linewidth=1.6, label=None if labelled else "promised")
+            axes.plot(
+                span, (bound, bound), color=BOUND, linewidth=1.6, label=None if labelled else "promised"
+            )
             labelled = True
     if np.isfinite(margin).any():
         k = int(np.nanargmin(margin))
-        axes.plot(motion.time[k], margin[k], "v", color="#1f6f8b", markersize=6, label=f"least: {margin[k]:.4f} m")
+        axes.plot(
+            motion.time[k], margin[k], "v", color="#1f6f8b", markersize=6, label=f"least: {margin[k]:.4f} m"
+        )
         axes.set_ylim(min(0.0, float(np.nanmin(margin)) * 1.1), max(1e-3, float(np.nanmax(margin)) * 1.12))
     axes.set_ylabel("margin [m]")
     axes.tick_params(labelbottom=False)
@@ -208,12 +226,16 @@ def _errors(axes: Axes, bundle: Bundle, parts: tuple[str, ...], unit: str) -> No
     found = {key: values for key, values in motion.errors.items() if key.rpartition(".")[2] in parts}
     worst = {key: float(np.nanmax(values)) for key, values in found.items() if np.isfinite(values).any()}
     order = sorted(worst, key=lambda key: -worst[key])
+    tasks = list(dict.fromkeys(key.rpartition(".")[0] for key in motion.errors))
     for i, key in enumerate(order):
         values = np.maximum(found[key], FLOOR)
         if i < MOST_LINES:
             name, _, part = key.rpartition(".")
             label = name if part == parts[0] else f"{name} ({part})"
-            axes.plot(motion.time, values, color=f"C{i}", linewidth=1.3, label=label)
+            style = "-" if part == parts[0] else "--"
+            axes.plot(
+                motion.time, values, style, color=f"C{tasks.index(name) % 10}", linewidth=1.3, label=label
+            )
         else:
             rest = f"{len(order) - i} with smaller errors" if i == MOST_LINES else None
             axes.plot(motion.time, values, color="#c3cbd2", linewidth=0.8, zorder=1, label=rest)
@@ -222,7 +244,9 @@ def _errors(axes: Axes, bundle: Bundle, parts: tuple[str, ...], unit: str) -> No
         axes.set_ylim(FLOOR, 1.0)
         axes.text(0.5, 0.5, "no such task", transform=axes.transAxes, ha="center", va="center", color=FAINT)
     axes.set_ylabel(f"error [{unit}]")
-    _title(axes, {"m": "Position errors of the tasks", "rad": "Orientation and joint errors of the tasks"}[unit])
+    _title(
+        axes, {"m": "Position errors of the tasks", "rad": "Orientation and joint errors of the tasks"}[unit]
+    )
     axes.tick_params(labelbottom=False)
     _legend(axes)
     _bands(axes, bundle)
@@ -245,7 +269,9 @@ def _joints(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
     _title(axes, "Joints between their limits")
     axes.set_xlabel("time [s]")
     if not names:
-        axes.text(0.5, 0.5, "no joint has limits", transform=axes.transAxes, ha="center", va="center", color=FAINT)
+        axes.text(
+            0.5, 0.5, "no joint has limits", transform=axes.transAxes, ha="center", va="center", color=FAINT
+        )
         return
     middles = (motion.time[1:] + motion.time[:-1]) / 2
     edges = np.concatenate([motion.time[:1], middles, motion.time[-1:]])
@@ -319,12 +345,15 @@ def _bands(axes: Axes, bundle: Bundle) -> None:
 
 
 def _phase_names(axes: Axes, bundle: Bundle) -> float:
-    """The phases' names above the axes, slanted where they would touch; returns their height [points]."""
+    """Write the phases' names above the axes, slanted if they touch; returns their height [points]."""
     start, end = bundle.trajectory.time[[0, -1]]
     names = [_short(phase["name"], 26) for phase in bundle.phases]
     middles = [(phase["start"] + phase["end"]) / 2 for phase in bundle.phases]
     wide = 0.0095 * (end - start)  # about one letter
-    slanted = any(b - a < wide * (len(m) + len(n) + 3) / 2 for (a, m), (b, n) in pairwise(zip(middles, names)))
+    slanted = any(
+        b - a < wide * (len(m) + len(n) + 3) / 2
+        for (a, m), (b, n) in pairwise(zip(middles, names, strict=True))
+    )
     last = -np.inf
     for middle, name in zip(middles, names, strict=True):
         if slanted and middle - last < 2.0 * wide:

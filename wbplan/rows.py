@@ -33,8 +33,8 @@ _CROSS = np.zeros((3, 9))
 _CROSS[2, 1] = _CROSS[0, 5] = _CROSS[1, 6] = 1.0
 _CROSS[1, 2] = _CROSS[2, 3] = _CROSS[0, 7] = -1.0
 
-#: Below this angle [rad] the derivative of the rotation logarithm is the identity to 1e-6.
-_SMALL_TURN = 1e-6
+#: Below this angle [rad] the derivative of the rotation logarithm is taken for the identity (off by half of it).
+_SMALL_TURN = 1e-4
 
 
 def support_mask(model: Any, frame: int) -> Array:

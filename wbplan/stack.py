@@ -25,6 +25,9 @@ from wbplan.rows import FrameRows
 
 Array = NDArray[np.float64]
 
+#: Bound on the curvature of an error, per unit of error: lever arms [m], and 1 for rotations.
+LEVER = 1.0
+
 #: Always on the diagonal [1/rad^2]: keeps the cost strictly convex where nothing is asked.
 REGULARISATION = 1e-6
 
@@ -118,7 +121,7 @@ class Stack:
                 gains.append(np.full(len(axes), c.gain))
         self._weight = np.concatenate(weights)
         self._pull = 1.0 - np.exp(-np.concatenate(gains) * self.dt)
-        self._curvature = self._weight**2 * self._pull
+        self._curvature = LEVER * self._weight**2 * self._pull
         self._weighted = np.zeros((n_soft, nf))
         self._weight_column, self._minus_weight = self._weight[:, None], -self._weight
         self.hard_error = np.zeros(self.n_hard)

@@ -26,3 +26,9 @@ def machine() -> ModuleType:
 def good(machine: ModuleType) -> Bundle:
     """A plan that keeps every promise."""
     return machine.build()
+
+
+@pytest.fixture
+def folder(good: Bundle, tmp_path: Path) -> Path:
+    """A bundle on disk, alone in its parent."""
+    return good.write(tmp_path / "plan")

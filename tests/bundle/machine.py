@@ -29,10 +29,10 @@ Path = Callable[[float], np.ndarray]
 
 
 def _link(name: str, mass: float, at: tuple[float, float, float] = (0, 0, 0), size: float = 0.05) -> str:
-    inertia = mass * size**2 / 6
+    i = mass * size**2 / 6
     return (
         f'<link name="{name}"><inertial><origin xyz="{at[0]} {at[1]} {at[2]}"/><mass value="{mass}"/>'
-        f'<inertia ixx="{inertia}" iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        f'<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
     )
 
 

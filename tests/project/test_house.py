@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -54,6 +56,23 @@ def test_no_file_names_a_machine() -> None:
             f"{path.relative_to(ROOT)}:{n}: {line}" for n, line in enumerate(lines, 1) if pattern.search(line)
         ]
     assert found == []
+
+
+def test_what_is_imported_is_declared() -> None:
+    """A package that another one happens to bring may be gone with its next release."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.split(r"[><=]", line)[0].lower() for line in project["dependencies"]}
+    named_otherwise = {"pinocchio": "pin", "umsgpack": "u-msgpack-python"}
+    optional = {"IPython"}  # a notebook brings it
+    found = set()
+    for path in (*(ROOT / "wbplan").rglob("*.py"), *(ROOT / "tasks").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                found.add((node.module or "").split(".")[0])
+    found -= {"wbplan", *optional, *sys.stdlib_module_names}
+    assert {named_otherwise.get(name, name) for name in found} - declared == set()
 
 
 def test_files_stay_short() -> None:

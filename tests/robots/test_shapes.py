@@ -2,40 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 
-URDF = Path(__file__).resolve().parents[2] / "urdf"
-
-
-def load(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
 
 @pytest.fixture(scope="module")
-def shapes(monkeypatch_module: pytest.MonkeyPatch) -> ModuleType:
-    module = load(URDF / "shapes.py")
-    monkeypatch_module.setitem(__import__("sys").modules, "shapes", module)
-    return module
+def shapes(run_script):
+    return run_script("shapes.py")
 
 
-@pytest.fixture(scope="module")
-def monkeypatch_module() -> object:
-    with pytest.MonkeyPatch.context() as patch:
-        yield patch
-
-
-def in_hexagon(x: np.ndarray, y: np.ndarray, radius: float) -> np.ndarray:
+def in_hexagon(x, y, radius):
     edges = np.deg2rad(30 + 60 * np.arange(6))
     return np.all(
         [x * np.cos(a) + y * np.sin(a) <= radius * np.cos(np.pi / 6) for a in edges],
@@ -43,7 +19,7 @@ def in_hexagon(x: np.ndarray, y: np.ndarray, radius: float) -> np.ndarray:
     )
 
 
-INSIDE: dict[str, tuple[tuple[float, ...], Callable[..., np.ndarray]]] = {
+INSIDE = {
     "box": ((0.3, 0.2, 0.1), lambda x, y, z: (abs(x) <= 0.15) & (abs(y) <= 0.1) & (abs(z) <= 0.05)),
     "cylinder": ((0.1, 0.3), lambda x, y, z: (x**2 + y**2 <= 0.01) & (abs(z) <= 0.15)),
     "sphere": ((0.15,), lambda x, y, z: x**2 + y**2 + z**2 <= 0.0225),
@@ -53,23 +29,20 @@ INSIDE: dict[str, tuple[tuple[float, ...], Callable[..., np.ndarray]]] = {
 
 
 @pytest.mark.parametrize("name", INSIDE)
-def test_volume_and_moments_are_those_of_the_solid(shapes: ModuleType, name: str) -> None:
+def test_volume_and_moments_are_those_of_the_solid(shapes, name):
     arguments, inside = INSIDE[name]
     edge = np.linspace(-0.2, 0.2, 161)
-    cells = (edge[1:] + edge[:-1]) / 2
-    x, y, z = (
-        c[inside(*(grid := np.meshgrid(cells, cells, cells)))] for c in np.meshgrid(cells, cells, cells)
-    )
+    cells = np.array(np.meshgrid(*[(edge[1:] + edge[:-1]) / 2] * 3))
+    x, y, z = cells[:, inside(*cells)]
     moments = np.array([np.mean(y**2 + z**2), np.mean(x**2 + z**2), np.mean(x**2 + y**2)])
 
     shape = getattr(shapes, name)(*arguments)
 
-    assert len(grid) == 3
     assert shape.volume == pytest.approx(len(x) * (0.4 / 160) ** 3, rel=0.02)
     np.testing.assert_allclose(shape.moments, moments, rtol=0.02)
 
 
-def test_a_divided_box_weighs_and_turns_as_the_whole(shapes: ModuleType) -> None:
+def test_a_divided_box_weighs_and_turns_as_the_whole(shapes):
     # Turned and shifted, so that rotation and parallel axes both count.
     turn, place = (0.3, -0.5, 1.1), np.array([0.1, -0.2, 0.3])
     axes = shapes.rotation(turn)
@@ -86,7 +59,7 @@ def test_a_divided_box_weighs_and_turns_as_the_whole(shapes: ModuleType) -> None
     np.testing.assert_allclose(divided.about_com, whole.about_com, atol=1e-12)
 
 
-def test_structure_without_a_part_to_carry_it_is_refused(shapes: ModuleType) -> None:
+def test_structure_without_a_part_to_carry_it_is_refused(shapes):
     weighed = shapes.Part(shapes.sphere(0.1), mass=1.0)
     with pytest.raises(ValueError, match=r"structure of 0\.5 kg"):
         shapes.inertia_of([weighed], structure=0.5)
@@ -97,12 +70,12 @@ def test_structure_without_a_part_to_carry_it_is_refused(shapes: ModuleType) -> 
 @pytest.mark.parametrize(
     "turn", [(0.1, 0.2, 0.3), (-2.0, 1.0, 3.0), (0.0, np.pi / 2, 0.7), (0.0, -np.pi / 2, 0.7)]
 )
-def test_angles_undo_rotation(shapes: ModuleType, turn: tuple[float, float, float]) -> None:
+def test_angles_undo_rotation(shapes, turn):
     matrix = shapes.rotation(turn)
     np.testing.assert_allclose(shapes.rotation(shapes.angles(matrix)), matrix, atol=1e-12)
 
 
-def test_a_rod_runs_from_its_start_to_its_end(shapes: ModuleType) -> None:
+def test_a_rod_runs_from_its_start_to_its_end(shapes):
     start, end = (0.1, -0.2, 0.3), (-0.2, 0.1, 0.7)
     part = shapes.rod(start, end, 0.01)
     half = np.linalg.norm(np.subtract(end, start)) / 2

@@ -12,7 +12,7 @@ from wbplan.bundle import Bundle, Trajectory
 from wbplan.geometry import support_polygon
 
 FEET = ("foot_a", "foot_b", "foot_c", "foot_d")
-FOUR, THREE = FEET, FEET[:3]
+FOUR, THREE = FEET, FEET[1:]
 BOX = (0.10, 0.20, 0.08)
 
 
@@ -71,16 +71,16 @@ def _phase(name: str, start: float, end: float, feet: tuple[str, ...], **more) -
     return {**phase, "closures": [], "carried": [], "tasks": [], **more}
 
 
-def make_bundle(model, urdf: str, seconds: float = 2.0, dt: float = 0.01) -> Bundle:
+def planned(model, urdf: str, seconds: float = 2.0, dt: float = 0.01) -> Bundle:
     """Two phases: it waits on four feet; then, on three, one leg swings and a box rises."""
     n = round(seconds / dt) + 1
     time = np.arange(n) * dt
     half = seconds / 2.0
     swing = np.clip((time - half) / half, 0.0, 1.0)
     q = np.tile(standing(model), (n, 1))
-    q[:, model.joints[model.getJointId("hip_d")].idx_q] = 0.8 * swing
+    q[:, model.joints[model.getJointId("hip_a")].idx_q] = -0.8 * swing
     phase = (time >= half - 1e-9).astype(np.int64)
-    com = np.column_stack([0.03 * np.sin(time), np.full(n, 0.01), np.full(n, 0.19)])
+    com = np.column_stack([0.03 * np.sin(time), np.full(n, -0.04), np.full(n, 0.19)])
     boxes = np.tile([0.45, 0.0, 0.04, 0.0, 0.0, 0.0, 1.0], (n, 1))
     boxes[:, 2] += 0.1 * swing
     targets = np.where(phase[:, None] == 1, boxes, np.nan)
@@ -89,7 +89,7 @@ def make_bundle(model, urdf: str, seconds: float = 2.0, dt: float = 0.01) -> Bun
     places = {foot: data.oMf[model.getFrameId(foot)].translation[:2].copy() for foot in FEET}
     regions = [support_polygon([places[foot] for foot in feet]) for feet in (FOUR, THREE)]
     margin = np.array([regions[p].margin(c[:2]) for p, c in zip(phase, com, strict=True)])
-    held = [{"name": "box", "frame": "foot_d", "pose": [0, 0, 0, 0, 0, 0, 1], "mass": 0.5, "com": [0, 0, 0]}]
+    held = [{"name": "box", "frame": "foot_a", "pose": [0, 0, 0, 0, 0, 0, 1], "mass": 0.5, "com": [0, 0, 0]}]
     plan = {
         "schema": 1,
         "wbplan": "0",
@@ -120,7 +120,7 @@ def make_bundle(model, urdf: str, seconds: float = 2.0, dt: float = 0.01) -> Bun
 
 @pytest.fixture(scope="session")
 def bundle(stool_model) -> Bundle:
-    return make_bundle(stool_model, STOOL)
+    return planned(stool_model, STOOL)
 
 
 def load_browser():
@@ -141,20 +141,51 @@ def context():
     missing = browser.why_not()
     if missing:
         pytest.skip(f"no page can be looked at: {missing}")
-    with browser.chromium(width=640, height=400) as context:
+    with browser.chromium(width=480, height=300) as context:
         yield context
 
 
 @pytest.fixture
+def make_bundle():
+    """Makes a plan like `bundle`, of any length: `(model, urdf, seconds, dt)`."""
+    return planned
+
+
+class Look:
+    """Opens addresses, and closes every page at the end."""
+
+    def __init__(self, context):
+        self._context = context
+        self._open = []
+
+    def __call__(self, address: str):
+        """A page of the view, ready."""
+        view = load_browser().View(self._context, address)
+        self._open.append(view)
+        return view
+
+    def bare(self, address: str):
+        """Any other page."""
+        page = self._context.new_page()
+        self._open.append(page)
+        page.goto(address)
+        return page
+
+    def close(self):
+        for page in self._open:
+            page.close()
+
+
+@pytest.fixture
 def look(context):
-    """Opens an address; every page is closed after the test."""
-    browser = load_browser()
-    views = []
-
-    def look(address: str):
-        views.append(browser.View(context, address))
-        return views[-1]
-
+    look = Look(context)
     yield look
-    for view in views:
-        view.close()
+    look.close()
+
+
+@pytest.fixture(scope="module")
+def look_long(context):
+    """The same, for a page that several tests look at."""
+    look = Look(context)
+    yield look
+    look.close()

@@ -244,17 +244,12 @@ def test_collision_shapes_are_drawn_only_where_nothing_else_is():
 
 
 def test_a_robot_without_shapes_is_nothing_and_no_error(window):
-    text = shaped() + ""
+    world = (
+        '<link name="world"/><joint name="j" type="fixed"><parent link="world"/><child link="base"/></joint>'
+    )
+    text = shaped(extra=world)
     assert robot_meshes(text) == []
-    Scene(
-        window,
-        text.replace(
-            "<link",
-            '<link name="world"/><joint name="j" type="fixed"><parent link="world"/>'
-            '<child link="base"/></joint><link',
-            1,
-        ),
-    ).update([0, 0, 0, 0, 0, 0, 1])
+    Scene(window, text).update([0, 0, 0, 0, 0, 0, 1])
 
 
 @pytest.mark.parametrize("name", ["package://robot/meshes/wedge.stl", "robot/meshes/wedge.stl"])

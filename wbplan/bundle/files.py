@@ -31,7 +31,7 @@ def is_bundle(folder: Path) -> bool:
 
 
 def write_folder(
-    folder: Path, writers: Mapping[str, Callable[[Path], None]], *, overwrite: bool = True
+    folder: Path, writers: Mapping[str, Callable[[Path], object]], *, overwrite: bool = True
 ) -> Path:
     """Fill a new folder beside the target, then put it in the target's place.
 
@@ -228,11 +228,14 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     key = ""
     arrays: dict[str, NDArray[Any]] = {}
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # The file is opened here: numpy leaves it open when the archive is damaged.
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise BundleError(f"{path}: expected an npz archive, found one array")
-            for key in archive.files:
-                arrays[key] = np.asarray(archive[key])
+            with archive:
+                for key in archive.files:
+                    arrays[key] = np.asarray(archive[key])
     except (OSError, ValueError, TypeError, EOFError, KeyError, NotImplementedError, RuntimeError) as error:
         raise BundleError(f"{path}: {key or 'archive'}: cannot be read: {error}") from error
     except (zipfile.BadZipFile, zlib.error, SyntaxError, MemoryError, OverflowError) as error:

@@ -45,7 +45,7 @@ def model_of(urdf: str, where: str) -> Any:
         raise BundleError(f"{where}: is no URDF that Pinocchio can build: {error}") from error
 
 
-def check_urdf(urdf: str, model: Any, where: str) -> None:
+def check_urdf(model: Any, where: str) -> None:
     """Refuse a robot that a trajectory of one column a joint cannot describe."""
     for index in range(2, model.njoints):
         if model.joints[index].nv != 1:

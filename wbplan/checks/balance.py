@@ -83,7 +83,7 @@ def _polygons(replay: Replay, phases: list[_Balance]) -> list[Row]:
 
 
 def _margins(replay: Replay, phases: list[_Balance]) -> list[Row]:
-    """At least what is promised; the first sample of a later phase, where feet lift or weight is taken, apart."""
+    """At least what is promised; apart, the first sample of a later phase, where feet lift."""
     through = Worst("support margin", "m", at_least=True, slack=1e-6)
     handover = Worst("margin at handover", "m", at_least=True, slack=1e-6)
     for phase in phases:

@@ -42,7 +42,7 @@ def _objects(replay: Replay, bounds: Tolerances) -> list[Row]:
     place, turn = Worst("object place", "m"), Worst("object turn", "rad")
     for name, recorded in replay.record.bodies.items():
         path = Poses.of(recorded)
-        known = np.isfinite(recorded).all(axis=1)
+        known = np.isfinite(np.sum(recorded, axis=1))
         left: Poses | None = None
         for window in replay.windows:
             item = _carried(window, name)
@@ -50,13 +50,13 @@ def _objects(replay: Replay, bounds: Tolerances) -> list[Row]:
             if not len(samples):
                 continue  # an object need not have a pose before anybody touches it
             expected = replay.held_pose(item, samples) if item is not None else left or path[samples[:1]]
-            own = (item is not None) & (replay.record.phase[samples] == window.index)
+            own = replay.record.phase[samples] == (window.index if item is not None else -1)
             times = replay.times(samples)
             for worst, off, bound in (
                 (place, path[samples].distance(expected), bounds.closure),
                 (turn, path[samples].turn(expected), bounds.rotation),
             ):
-                worst.see(off, np.where(own, RECORD, bound)[:, None], times, window.name, [name])
+                worst.see(off, np.where(own, RECORD, bound).reshape(-1, 1), times, window.name, [name])
             left = expected[-1:]
     return [*place.rows(), *turn.rows()]
 

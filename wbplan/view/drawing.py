@@ -147,7 +147,7 @@ class Drawing:
     def target(self, name: str) -> str:
         """Draws a target's frame; returns its node."""
         path = node("targets", name)
-        self.put(path, shapes.triad(0.07 * self.unit))
+        self.put(path, shapes.triad(0.055 * self.unit))
         return path
 
     def trail(self, name: str, points: ArrayLike, colour: int) -> str:

@@ -67,13 +67,17 @@ class Figure:
         """(4, 4) poses in the world, one for each of `links`."""
         return [self._data.oMf[i].homogeneous for i in self._ids]
 
+    def has(self, frame: str) -> bool:
+        """Whether the robot has a frame of this name."""
+        return bool(self.model.existFrame(frame))
+
     def position(self, frame: str) -> Array:
         """(3,) [m], a frame's origin in the world.
 
         Raises:
             ViewError: no such frame.
         """
-        if not self.model.existFrame(frame):
+        if not self.has(frame):
             names = [f.name for f in self.model.frames]
             raise ViewError(f"view: the robot has no frame '{frame}'; it has {listing(names)}")
         return np.array(self._data.oMf[self.model.getFrameId(frame)].translation)

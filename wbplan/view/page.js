@@ -60,11 +60,14 @@ function upTo(times, t) {
   return low - 1;
 }
 
-// Each trail shows its points up to now.
+// Each trail shows where its frame was in the last seconds; more of the past would only be clutter.
+const TRAIL_SECONDS = 6;
 function grow(t) {
   for (const trail of node("trails").children) {
     const line = trail.children[0];
-    if (trail.times && line && line.geometry) line.geometry.setDrawRange(0, upTo(trail.times, t) + 1);
+    if (!trail.times || !line || !line.geometry) continue;
+    const first = Math.max(0, upTo(trail.times, t - TRAIL_SECONDS));
+    line.geometry.setDrawRange(first, upTo(trail.times, t) + 1 - first);
   }
 }
 

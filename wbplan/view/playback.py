@@ -180,7 +180,8 @@ class _Playback:
         self.phase: NDArray[np.int64] = np.clip(self.trajectory.phase[self.picked], 0, len(self.phases) - 1)
         self.duration = max(float(self.time[-1]), 1e-3)
         self.feet = list(dict.fromkeys(c["frame"] for phase in self.phases for c in phase["contacts"]))
-        self.tips = list(dict.fromkeys(_holding(self.phases)))
+        # A closure may also name a carried body, which the robot's model does not have.
+        self.tips = [name for name in dict.fromkeys(_holding(self.phases)) if self.figure.has(name)]
         self.tracks: list[Track] = []
 
     def draw(self) -> None:
@@ -199,7 +200,7 @@ class _Playback:
 
     def _kinematics(self) -> None:
         """Poses (N, L, 4, 4) of links, places (N, 3) of tips, and corners of the space that is taken."""
-        frames = [*self.feet, *self.tips]
+        frames = list(dict.fromkeys([*self.feet, *self.tips]))
         poses, places, corners = [], [], []
         every = max(1, len(self.picked) // 24)
         for i, k in enumerate(self.picked):

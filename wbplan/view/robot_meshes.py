@@ -139,6 +139,8 @@ def _loaded(mesh: Any, link: str, folders: Sequence[Path]) -> list[Any]:
     except Exception as error:
         raise ViewError(f"view: link '{link}': mesh {path} cannot be read: {error}") from error
     loaded = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    if not loaded:
+        raise ViewError(f"view: link '{link}': mesh {path} cannot be read: it holds no triangles")
     for part in loaded:
         if mesh.scale is not None:
             part.apply_scale(mesh.scale)

@@ -1,0 +1,117 @@
+"""The picture of a plan: what it shows, and that it can always be drawn."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from wbplan import plots
+from wbplan.bundle import NO_MARGIN, Bundle
+from wbplan.errors import BundleError
+
+
+def texts(drawing: Figure) -> set[str]:
+    found = set()
+    for axes in drawing.axes:
+        labels = axes.get_legend_handles_labels()[1]
+        found |= {axes.get_title(loc="left"), axes.get_xlabel(), axes.get_ylabel(), *labels}
+        found |= {text.get_text() for text in (*axes.texts, *axes.get_yticklabels())}
+    return found
+
+
+def lines(drawing: Figure, label: str) -> list[np.ndarray]:
+    return [line.get_xydata() for axes in drawing.axes for line in axes.lines if line.get_label() == label]
+
+
+@pytest.fixture(scope="module")
+def drawing(good: Bundle) -> Figure:
+    return plots.figure(good)
+
+
+def test_the_picture_names_phases_feet_tasks_and_joints(good: Bundle, drawing: Figure) -> None:
+    shown = texts(drawing)
+    assert {phase["name"] for phase in good.phases} <= shown
+    assert {"leg1", "leg2", "leg3", "leg4", "base"} <= shown
+    assert set(good.trajectory.joint_names) <= shown
+    assert {"margin [m]", "error [m]", "error [rad]", "x [m]", "y [m]", "time [s]"} <= shown
+
+
+def test_the_margin_and_its_least_value_are_the_trajectory_s(good: Bundle, drawing: Figure) -> None:
+    motion = good.trajectory
+    (margin,) = lines(drawing, "margin")
+    np.testing.assert_allclose(margin, np.column_stack([motion.time, motion.margin]))
+    least = f"least: {motion.margin.min():.4f} m"
+    (marked,) = lines(drawing, least)
+    assert marked[0, 0] == motion.time[np.argmin(motion.margin)]
+    (promised,) = lines(drawing, "promised")
+    assert promised[0, 1] == good.phases[0]["margin"]
+
+
+def test_the_com_s_path_starts_and_ends_where_it_does(good: Bundle, drawing: Figure) -> None:
+    (start,), (end,) = lines(drawing, "CoM at the start"), lines(drawing, "CoM at the end")
+    np.testing.assert_allclose(start[0], good.trajectory.com[0, :2])
+    np.testing.assert_allclose(end[0], good.trajectory.com[-1, :2])
+    view = drawing.axes[0]
+    path = np.array(view.collections[0].get_segments())
+    np.testing.assert_allclose(path[:, 0], good.trajectory.com[:-1, :2])
+    # Three polygons, each with its inset: four feet, three feet, four feet with the first one ahead.
+    assert len(view.patches) == 6
+
+
+def test_the_file_is_a_picture_and_the_same_each_time(good: Bundle, tmp_path: Path) -> None:
+    first = plots.save(good, tmp_path / "one.png")
+    picture = imread(first)
+    assert picture.shape[:2] == (int(plots.SIZE[1] * plots.DPI), int(plots.SIZE[0] * plots.DPI))
+    assert len(np.unique((picture[::7, ::7, :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 50
+    assert plots.save(good, tmp_path / "two.png").read_bytes() == first.read_bytes()
+
+
+def test_a_notebook_gets_a_picture_without_pyplot(drawing: Figure) -> None:
+    assert drawing._repr_png_().startswith(b"\x89PNG")
+
+
+def test_importing_the_module_does_not_import_matplotlib() -> None:
+    code = (
+        "import sys; from wbplan import plots; from wbplan.bundle import Bundle; "
+        "sys.exit(any(name.split('.')[0] == 'matplotlib' for name in sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_drawing_leaves_pyplot_alone(good: Bundle) -> None:
+    plots.figure(good)
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    assert pyplot is None or pyplot.get_fignums() == []
+
+
+def test_a_plan_with_little_in_it_can_be_drawn(machine: ModuleType, good: Bundle, tmp_path: Path) -> None:
+    promises = machine.phases()
+    for phase in promises:
+        phase.update(margin=NO_MARGIN, contacts=[], carried=[], closures=[], tasks=[])
+    bare = machine.build(promises=promises, tray=lambda t: 0.3, robot=machine.urdf(tray="continuous"))
+    bare = machine.edited(bare, errors={"hand.position": np.full(len(bare.trajectory), np.nan)}, targets={})
+    shown = texts(plots.figure(bare))
+    assert "no such task" in shown
+    assert "tray_joint" not in shown
+    assert plots.save(bare, tmp_path / "bare.png").stat().st_size > 10_000
+
+
+def test_only_the_largest_errors_have_a_line_of_their_own(machine: ModuleType, good: Bundle) -> None:
+    motion = good.trajectory
+    errors = {f"task{i}.position": np.full(len(motion), 10.0 ** (i - 9)) for i in range(12)}
+    shown = texts(plots.figure(machine.edited(good, errors=errors)))
+    assert {f"task{i}" for i in range(4, 12)} <= shown
+    assert "4 with smaller errors" in shown
+    assert "task3" not in shown
+
+
+def test_a_path_that_cannot_be_written_is_named(good: Bundle, tmp_path: Path) -> None:
+    with pytest.raises(BundleError, match=r"nowhere.*plots\.png: cannot be written"):
+        plots.save(good, tmp_path / "nowhere" / "plots.png")
