@@ -10,14 +10,13 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 demo: env
 	$(PY) -m wbplan run clamp --out out/clamp
-	$(PY) -m wbplan check out/clamp
 
 test: env-test
 	sh tools/browser.sh
 	$(PY) -m pytest -n 2 --dist loadscope $(ARGS)
 
 bench: env-bench
-	$(PY) -m bench $(ARGS)
+	$(PY) -m wbplan.bench $(ARGS)
 
 lint: env-test
 	$(PY) -m ruff check .

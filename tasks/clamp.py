@@ -5,8 +5,14 @@ arms, clamps a box between their palms, lifts it and takes it along a path of si
 the body makes up for what two limbs of five joints lack, puts it down, and stands on six legs again.
 
 Source: Zheng, Xu, Tian, Ding, "Different manipulation mode analysis of a radial symmetrical hexapod robot
-with leg-arm integration", 2022, section 5.1 and figure 21.
+with leg-arm integration", 2022, section 5.1 and figure 21. The paper gives no box, path or times; those
+here are chosen.
 """
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,9 +22,15 @@ import wbplan as wb
 ROBOT = "legarm_hexapod"
 
 ARMS = ("limb1", "limb2")
+STEPPERS = ("leg3_foot", "leg6_foot")
 CARRIERS = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")
 SIX = ("limb1_foot", "limb2_foot", *CARRIERS)
-STEPPERS = ("leg3_foot", "leg6_foot")
+REAR_AND_ARMS = ("limb1_foot", "limb2_foot", "leg4_foot", "leg5_foot")
+
+BOX_SIZE = (0.25, 0.15, 0.12)  # [m]
+BACK = -0.02  # where the body is kept [m] along y while the arms are ahead of it
+TALL = 0.275  # body height [m] for stepping: the shanks' limit of 60 degrees leaves a lower body's feet no room to rise
+STEP = 0.03  # how high feet rise [m]
 
 
 def script(
@@ -30,129 +42,147 @@ def script(
     mass: float = 0.8,
     lift: float = 0.10,
     margin: float = 0.04,
-    step_forward: float = 0.22,
     friction: float = 0.7,
 ) -> wb.Script:
     """The experiment's steps (a) to (i).
 
     Args:
         robot: the leg-arm hexapod.
-        box_x, box_y, box_z: centre of the box [m], world, where it stands at first and at last.
+        box_x: where the box stands at first and at last [m], world.
+        box_y: likewise; +y is ahead, between the two limbs.
+        box_z: height of the box's centre [m]; 0.06 stands on the ground.
         mass: of the box [kg].
         lift: how high the box is lifted [m].
         margin: stability margin kept throughout [m].
-        step_forward: how far legs 3 and 6 step towards the box [m].
         friction: of the feet on the ground [-].
     """
     stand = robot.state("stand")
     home = {foot: stand.pose(foot).translation for foot in SIX}
-    ahead = {foot: home[foot] + np.array([-0.045 * np.sign(home[foot][0]), step_forward, 0.0]) for foot in STEPPERS}
-    start = pin.SE3(np.eye(3), np.array([box_x, box_y, box_z]))
-    box = wb.Body("box", mass=mass, size=(0.25, 0.15, 0.12), pose=start)
-    palms = {"limb1": -0.125, "limb2": 0.125}  # [m] along the box's x axis
-
+    ahead = {foot: home[foot] + np.array([-0.045 * np.sign(home[foot][0]), 0.22, 0.0]) for foot in STEPPERS}
+    raised = {f"{limb}_foot": home[f"{limb}_foot"] + np.array([0.0, 0.0, STEP]) for limb in ARMS}
+    box = wb.Body("box", mass=mass, size=BOX_SIZE, pose=_pose((box_x, box_y, box_z)))
+    arms_out = {joint: value for joint, value in robot.poses["manipulate"].items() if joint.startswith(ARMS)}
+    legs_under = {f"{limb}_joint{k}": stand.joint(f"{limb}_joint{k}") for limb in ARMS for k in (1, 2, 3)}
     limits = [wb.JointLimits(speed=0.8), wb.SupportPolygon(margin=margin)]
-    keep = wb.PostureTask(stand, weight=0.1, name="keep posture")
-    level = wb.PoseTask("body", stand.pose("body"), weight=((0.5, 0.5, 0.2), 0.5), gain=1.0, name="body")
 
-    def body_to(height, seconds):
-        """The body level over its place at a height [m]."""
-        goal = pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
-        return wb.PoseTask("body", wb.MinJerk(wb.AS_IS, goal, seconds), weight=(10.0, 10.0), name="body")
+    def phase(name: str, feet: Iterable[str], role: str, seconds: float, **fields: Any) -> wb.Phase:
+        return wb.Phase(
+            name,
+            contacts=[wb.Contact(foot, friction=friction) for foot in feet],
+            roles={limb: role for limb in ARMS},
+            limits=limits,
+            duration=seconds,
+            **fields,
+        )
 
-    tall, low = 0.285, 0.22
-    unfolded = {j: v for j, v in robot.poses["manipulate"].items() if j.startswith(ARMS)}
+    def body(height: float, seconds: float) -> list[wb.Task]:
+        """The body level at a height over its place, the joints towards their stance."""
+        goal = wb.MinJerk(wb.AS_IS, _pose((0.0, 0.0, height)), seconds)
+        return [wb.PoseTask("body", goal, weight=(10.0, 10.0)), _posture(robot.poses["stand"], seconds, 0.1)]
 
-    def on(feet):
-        return [wb.Contact(foot, friction=friction) for foot in feet]
+    def free_body(seconds: float) -> list[wb.Task]:
+        """The body where the arms need it, else near its stance."""
+        near = wb.MinJerk(wb.AS_IS, _pose((0.0, BACK, 0.24)), seconds)
+        return [
+            wb.PoseTask("body", near, weight=((0.5, 0.5, 0.2), 0.5)),
+            _posture(robot.poses["stand"], seconds, 0.1),
+        ]
 
-    def joints_to(names, seconds, weight=1.0):
-        target = {j: wb.MinJerk(wb.AS_IS, unfolded[j], seconds) for j in names}
-        return wb.PostureTask(target, weight=weight, gain=20.0, name="limbs")
+    def arms(joints: Iterable[str], seconds: float) -> wb.PostureTask:
+        """Both limbs' joints of these names to their place in the pose 'manipulate'."""
+        wanted = {joint: value for joint, value in arms_out.items() if joint.endswith(tuple(joints))}
+        return _posture(wanted, seconds, 1.0, name="arms")
 
-    def palms_at(offset, seconds):
-        """Both palms in line with the box's faces, `offset` [m] away from them; free to turn about that line."""
+    def palms(gap: float, seconds: float) -> list[wb.Task]:
+        """Both palms `gap` [m] from the box's sides and facing them; they may turn about their own axis."""
         tasks = []
-        for limb, x in palms.items():
-            side = np.sign(x)
-            facing = pin.SE3(pin.exp3(np.array([0.0, 0.0, np.pi if side > 0 else 0.0])), np.array([x + side * offset, 0, 0]))
-            goal = wb.MinJerk(wb.AS_IS, start * facing, seconds)
-            tasks.append(wb.PoseTask(f"{limb}_tip", goal, weight=(20.0, (0.0, 10.0, 10.0))))
+        for limb, side in (("limb1", -1.0), ("limb2", 1.0)):
+            inward = _pose((side * (BOX_SIZE[0] / 2 + gap), 0.0, 0.0), (0.0, 0.0, 0.0 if side < 0 else 180.0))
+            path = wb.MinJerk(wb.AS_IS, box.pose * inward, seconds)
+            tasks.append(wb.PoseTask(f"{limb}_tip", path, weight=(20.0, (0.0, 10.0, 10.0))))
         return tasks
 
-    def swing(feet, goals, seconds):
-        return [wb.PositionTask(foot, wb.Swing(wb.AS_IS, goals[foot], 0.04, seconds)) for foot in feet]
+    def feet_to(places: Mapping[str, np.ndarray], seconds: float) -> list[wb.Task]:
+        """Feet straight to their places, from rest to rest."""
+        return [wb.PositionTask(foot, wb.MinJerk(wb.AS_IS, place, seconds)) for foot, place in places.items()]
 
-    def move(translation, rotation_deg):
-        return pin.SE3(pin.exp3(np.radians(rotation_deg)), start.translation + np.array(translation))
+    def step_to(places: Mapping[str, np.ndarray], seconds: float) -> list[wb.Task]:
+        """Legs 3 and 6 through the air to their places."""
+        return [wb.PositionTask(foot, wb.Swing(wb.AS_IS, places[foot], STEP, seconds)) for foot in STEPPERS]
 
+    def carry(name: str, path: wb.Path, seconds: float) -> wb.Phase:
+        """The box, clamped between both palms, along a path."""
+        return phase(
+            name, CARRIERS, "arm", seconds,
+            carried=[wb.Carried(box, by="limb1_tip")],
+            hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
+            soft=[wb.PoseTask("box", path, weight=(100.0, 50.0)), *free_body(seconds)],
+        )
+
+    def beside(xyz: tuple[float, float, float], rpy_deg: tuple[float, float, float]) -> Any:
+        """A pose of the box against where it stands."""
+        return _pose(tuple(box.pose.translation + np.array(xyz)), rpy_deg)
+
+    above = beside((0.0, 0.0, lift), (0.0, 0.0, 0.0))
     tour = wb.Waypoints(
         (0.0, 2.0, 4.0, 6.0, 8.0),
         (
             wb.AS_IS,
-            move((0.03, 0.00, lift + 0.03), (4.0, 0.0, 6.0)),
-            move((0.00, 0.02, lift + 0.02), (2.0, 6.0, 0.0)),
-            move((-0.03, 0.00, lift + 0.03), (4.0, 0.0, -6.0)),
-            move((0.0, 0.0, lift), (0.0, 0.0, 0.0)),
+            beside((0.03, 0.00, lift + 0.03), (4.0, 0.0, 6.0)),
+            beside((0.00, 0.02, lift + 0.02), (2.0, 6.0, 0.0)),
+            beside((-0.03, 0.00, lift + 0.03), (4.0, 0.0, -6.0)),
+            above,
         ),
     )
-    clamp = dict(
-        contacts=on(CARRIERS),
-        carried=[wb.Carried(box, by="limb1_tip")],
-        hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
-        limits=limits,
-    )
-
-    def carry(name, path, seconds):
-        return wb.Phase(name, soft=[wb.PoseTask("box", path, weight=(100.0, 50.0)), keep, level], duration=seconds, **clamp)
-
-    up, down = move((0.0, 0.0, lift), (0.0, 0.0, 0.0)), start
-    first_three = [j for j in unfolded if j.endswith(("joint1", "joint2", "joint3"))]
-    wrists = [j for j in unfolded if j.endswith(("joint1", "joint2", "joint3", "joint4", "joint5"))]
-    raised = {f"{limb}_foot": home[f"{limb}_foot"] + np.array([0.0, 0.0, 0.05]) for limb in ARMS}
-
-    def lift_feet(goals, seconds):
-        return [wb.PositionTask(foot, wb.MinJerk(wb.AS_IS, goals[foot], seconds)) for foot in raised]
-
-    arms = {"roles": {limb: "arm" for limb in ARMS}, "contacts": on(CARRIERS), "limits": limits}
-    legs = {"roles": {limb: "leg" for limb in ARMS}, "limits": limits}
+    shoulder, elbow, wrist = ("joint1", "joint2", "joint3"), ("joint4",), ("joint5",)
+    folding = {f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, 0.0, 0.8) for limb in ARMS for joint in ("joint5", "finger_a", "finger_b")}
+    unfolding = {
+        f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, value, 1.6)
+        for limb in ARMS
+        for joint, value in (("joint4", arms_out[f"{limb}_joint4"]), ("shank2", 0.0))
+    }
     return wb.Script(
-        # (a) six-legged stance
-        wb.Phase("a stand", contacts=on(SIX), soft=[keep, body_to(tall, 1.0)], duration=1.2, **legs),
-        # (b) legs 3 and 6 step forward
-        wb.Phase(
-            "b step forward", contacts=on(set_minus(SIX, STEPPERS)), hard=swing(STEPPERS, ahead, 1.5),
-            soft=[keep, body_to(tall, 1.0)], duration=1.5, **legs,
-        ),
-        # (c) limbs 1 and 2 lift and become arms
-        wb.Phase("c unload", contacts=on(SIX), soft=[keep, level], duration=0.5, **legs),
-        wb.Phase("c lift", contacts=on(CARRIERS), hard=lift_feet(raised, 0.8), soft=[keep, level], duration=0.8, **legs),
-        wb.Phase("c raise", contacts=on(CARRIERS), soft=[joints_to(first_three, 1.2), level], duration=1.2, **legs),
-        wb.Phase("c unfold", soft=[joints_to(wrists, 2.0), level], duration=2.0, **arms),
+        # (a) six-legged stance; the body rises to give the feet room
+        phase("a stand", SIX, "leg", 1.2, soft=body(TALL, 1.2)),
+        # (b) legs 3 and 6 step forward, the body moves over the four that will carry
+        phase("b step forward", REAR_AND_ARMS, "leg", 1.5, hard=step_to(ahead, 1.5), soft=body(TALL, 1.5)),
+        phase("b shift", SIX, "leg", 0.8, soft=free_body(0.8)),
+        # (c) limbs 1 and 2 lift and become arms: elbow and shank first, then wrist and fingers
+        phase("c lift", CARRIERS, "leg", 0.8, hard=feet_to(raised, 0.8), soft=free_body(0.8)),
+        phase("c raise", CARRIERS, "leg", 1.2, soft=[arms(shoulder, 1.2), *free_body(1.2)]),
+        phase("c unfold", CARRIERS, "leg", 1.6, driven=unfolding, soft=[arms(shoulder, 1.6), *free_body(1.6)]),
+        phase("c open", CARRIERS, "arm", 1.2, soft=[arms((*shoulder, *elbow, *wrist), 1.2), *free_body(1.2)]),
         # (d) both palms reach the box and clamp it
-        wb.Phase("d reach", soft=[*palms_at(0.04, 2.5), keep, level], duration=2.5, **arms),
-        wb.Phase("d clamp", soft=[*palms_at(0.0, 1.0), keep, level], duration=1.2, **arms),
-        # (e) lift it, take it along a path of six degrees of freedom
-        carry("e lift", wb.MinJerk(wb.AS_IS, up, 2.0), 2.0),
+        phase("d reach", CARRIERS, "arm", 2.5, soft=[*palms(0.04, 2.5), *free_body(2.5)]),
+        phase("d clamp", CARRIERS, "arm", 1.0, soft=[*palms(0.0, 1.0), *free_body(1.0)]),
+        # (e) lift it, and take it along a path of six degrees of freedom
+        carry("e lift", wb.MinJerk(wb.AS_IS, above, 2.0), 2.0),
         carry("e move", tour, 8.0),
-        # (f) put it down, withdraw, limbs become legs
-        carry("f lower", wb.MinJerk(wb.AS_IS, down, 2.0), 2.2),
-        wb.Phase("f release", soft=[*palms_at(0.04, 1.0), keep, level], duration=1.0, **arms),
-        wb.Phase("f withdraw", soft=[joints_to(wrists, 2.0), level], duration=2.0, **arms),
-        wb.Phase("f fold", contacts=on(CARRIERS), soft=[keep, level], duration=2.0, **legs),
+        # (f) put it down; arms back and folded: wrist and fingers first, then elbow and shank
+        carry("f lower", wb.MinJerk(wb.AS_IS, box.pose, 2.0), 2.2),
+        phase("f release", CARRIERS, "arm", 1.0, soft=[*palms(0.04, 1.0), *free_body(1.0)]),
+        phase("f withdraw", CARRIERS, "arm", 2.0, soft=[arms((*shoulder, *elbow, *wrist), 2.0), *free_body(2.0)]),
+        phase("f close", CARRIERS, "arm", 0.8, driven=folding, soft=[arms((*shoulder, *elbow), 0.8), *free_body(0.8)]),
+        phase("f fold", CARRIERS, "leg", 1.6, soft=[arms(shoulder, 1.6), *free_body(1.6)]),
         # (g) limbs 1 and 2 return to the ground
-        wb.Phase("g lower", contacts=on(CARRIERS), hard=lift_feet(raised, 1.2), soft=[keep, level], duration=1.2, **legs),
-        wb.Phase("g touch", contacts=on(CARRIERS), hard=lift_feet(home, 0.8), soft=[keep, level], duration=0.8, **legs),
-        # (h, i) legs 3 and 6 step back; stand on six
-        wb.Phase(
-            "h step back", contacts=on(set_minus(SIX, STEPPERS)), hard=swing(STEPPERS, home, 1.5),
-            soft=[keep, body_to(tall, 1.0)], duration=1.5, **legs,
-        ),
-        wb.Phase("i stand", contacts=on(SIX), soft=[keep, level], duration=1.0, **legs),
+        phase("g lower", CARRIERS, "leg", 1.5, soft=[_posture(legs_under, 1.5, 1.0, name="limbs"), *body(TALL, 1.2)]),
+        phase("g touch", CARRIERS, "leg", 0.8, hard=feet_to({foot: home[foot] for foot in raised}, 0.8), soft=body(TALL, 0.8)),
+        # (h) legs 3 and 6 step back
+        phase("h step back", REAR_AND_ARMS, "leg", 1.5, hard=step_to(home, 1.5), soft=body(TALL, 1.5)),
+        # (i) six-legged stance
+        phase("i stand", SIX, "leg", 1.5, soft=body(stand.q[2], 1.2)),
         bodies=[box],
     )
 
 
-def set_minus(feet, without):
-    """The feet that stay."""
-    return tuple(foot for foot in feet if foot not in without)
+def _pose(xyz: Iterable[float], rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
+    """A pose from a place [m] and a rotation vector [degrees]."""
+    return pin.SE3(pin.exp3(np.radians(rpy_deg)), np.array(tuple(xyz)))
+
+
+def _posture(joints: Mapping[str, float], seconds: float, weight: float, name: str = "posture") -> wb.PostureTask:
+    """Joints from where they are to their values, from rest to rest."""
+    return wb.PostureTask(
+        {joint: wb.MinJerk(wb.AS_IS, value, seconds) for joint, value in joints.items()},
+        weight=weight, gain=10.0, name=name,
+    )

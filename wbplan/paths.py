@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import abc
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, final
 
 import numpy as np
@@ -25,6 +25,12 @@ from wbplan.errors import SpecError
 Array = NDArray[np.float64]
 Value = Any  # pin.SE3 or Array: pinocchio ships no types
 
+# What a path's values are, in the words of messages.
+POSE = "pin.SE3"
+ROTATION = "an array of shape (3, 3)"
+POINT = "an array of shape (3,)"
+NUMBER = "a number"
+
 
 @final
 class AsIs:
@@ -33,55 +39,103 @@ class AsIs:
     def __repr__(self) -> str:
         return "AS_IS"
 
+    def __reduce__(self) -> str:
+        return "AS_IS"  # copies of it are itself
+
 
 AS_IS: Final = AsIs()
 
 
 def checked(value: object, what: str) -> Value:
-    """A copy of a pose or vector, refused with a `SpecError` when it is neither or is not finite."""
+    """A copy of a pose or array, or `AS_IS`; a `SpecError` where it is not finite or no rotation."""
     if isinstance(value, AsIs):
         return value
     if isinstance(value, pin.SE3):
         matrix = np.asarray(value.homogeneous)
         if not np.isfinite(matrix).all():
             raise SpecError(f"{what}: the pose holds NaN or infinity:\n{matrix}")
-        rotation = matrix[:3, :3]
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
-            raise SpecError(f"{what}: the pose's rotation matrix is not a rotation:\n{rotation}")
+        _check_rotation(matrix[:3, :3], what)
         return pin.SE3(value)
     try:
-        vector = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise SpecError(f"{what}: expected pin.SE3 or an array of numbers, got {value!r}") from None
-    if not np.isfinite(vector).all():
-        raise SpecError(f"{what}: NaN or infinite value in {vector}")
-    vector.setflags(write=False)
-    return vector
+        array = np.array(value)
+    except ValueError:  # lists of different lengths
+        array = np.array(None)
+    if array.dtype.kind not in "biuf":
+        raise SpecError(f"{what}: expected pin.SE3 or an array of numbers, got {value!r}")
+    numbers = array.astype(np.float64)
+    if not np.isfinite(numbers).all():
+        raise SpecError(f"{what}: NaN or infinite value in {numbers}")
+    if numbers.shape == (3, 3):
+        _check_rotation(numbers, what)
+    numbers.setflags(write=False)
+    return numbers
 
 
-def _seconds(value: float, what: str) -> float:
-    try:
-        seconds = float(value)
-    except (TypeError, ValueError):
-        raise SpecError(f"{what}: expected a time in seconds, got {value!r}") from None
-    if not (np.isfinite(seconds) and seconds > 0.0):
-        raise SpecError(f"{what}: expected a finite positive time in seconds, got {seconds}")
-    return seconds
+def _check_rotation(matrix: Array, what: str) -> None:
+    off = matrix @ matrix.T - np.eye(3)
+    if np.abs(off).max() > 1e-6 or np.linalg.det(matrix) < 0.0:
+        raise SpecError(f"{what}: not a rotation matrix:\n{matrix}")
 
 
-def _same_kind(values: Sequence[Value], what: str) -> None:
-    kinds = {"pose" if isinstance(v, pin.SE3) else f"vector of shape {np.shape(v)}" for v in values if v is not AS_IS}
+def kind_of(value: Value) -> str | None:
+    """What a value is, in the words of messages; `None` for `AS_IS`."""
+    if isinstance(value, AsIs):
+        return None
+    if isinstance(value, pin.SE3):
+        return POSE
+    shape = np.shape(value)
+    return f"an array of shape {shape}" if shape else NUMBER
+
+
+def number(
+    value: object, what: str, expected: str, *, least: float = -np.inf, above: float = -np.inf
+) -> float:
+    """A finite number of at least `least` and above `above`, refused with a `SpecError` if it is not."""
+    try:  # not float(value) at once: that takes "1.0" as well
+        scalar = np.array(value)
+    except ValueError:  # lists of different lengths
+        scalar = np.array(None)
+    if scalar.shape == () and scalar.dtype.kind in "biuf":
+        found = float(scalar)
+        if np.isfinite(found) and found >= least and found > above:
+            return found
+    raise SpecError(f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}")
+
+
+def name_of(value: object, what: str) -> str:
+    """A name, refused with a `SpecError` where it is empty or no text."""
+    if not isinstance(value, str) or not value:
+        raise SpecError(f"{what}: expected a name, got {value!r}")
+    return value
+
+
+def _common_kind(values: Sequence[Value], what: str) -> str | None:
+    """The one kind of all values; `None` where all are `AS_IS`."""
+    kinds = sorted({kind for value in values if (kind := kind_of(value)) is not None})
     if len(kinds) > 1:
-        raise SpecError(f"{what}: its points are of different kinds: {', '.join(sorted(kinds))}")
+        raise SpecError(f"{what}: its points are of different kinds: {', '.join(kinds)}")
+    return kinds[0] if kinds else None
+
+
+def _start(here: Value, kind: str | None) -> Value:
+    """The value at a phase's start as a path of this kind wants it."""
+    return here.rotation if kind == ROTATION and isinstance(here, pin.SE3) else here
+
+
+def _turned(start: Array, goal: Array, s: float) -> Array:
+    turned: Array = start @ pin.exp3(s * pin.log3(start.T @ goal))
+    return turned
 
 
 def _blend(start: Value, goal: Value, s: float) -> Value:
     """The point a fraction `s` of the way from `start` to `goal`."""
+    if start is AS_IS or goal is AS_IS:
+        raise SpecError("a path from or to AS_IS has a value only once its phase begins (or after `bind`)")
     if isinstance(start, pin.SE3):
-        turn = pin.log3(start.rotation.T @ goal.rotation)
-        return pin.SE3(
-            start.rotation @ pin.exp3(s * turn), (1.0 - s) * start.translation + s * goal.translation
-        )
+        along = (1.0 - s) * start.translation + s * goal.translation
+        return pin.SE3(_turned(start.rotation, goal.rotation, s), along)
+    if start.shape == (3, 3):
+        return _turned(start, goal, s)
     return start + s * (goal - start)
 
 
@@ -90,6 +144,9 @@ class Path(abc.ABC):
 
     #: Whether the value may change between two calls with the same time (only `Live`).
     live: bool = False
+
+    #: What its values are, in the words of messages; `None` where that is not known before `bind`.
+    kind: str | None = None
 
     @abc.abstractmethod
     def at(self, t: float) -> Value:
@@ -114,10 +171,11 @@ class Hold(Path):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", checked(self.value, "Hold"))
+        object.__setattr__(self, "kind", kind_of(self.value))
 
     def at(self, t: float) -> Value:
         """See `Path.at`."""
-        return self.value
+        return pin.SE3(self.value) if isinstance(self.value, pin.SE3) else self.value
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`."""
@@ -135,32 +193,36 @@ def min_jerk(s: float) -> float:
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
-@dataclass(frozen=True, eq=False)
 class _Segment(Path):
+    """What the paths from one value to another have in common; their fields are their own."""
+
     start: Value
     goal: Value
     duration: float
 
     def __post_init__(self) -> None:
-        kind = type(self).__name__
-        object.__setattr__(self, "start", checked(self.start, f"{kind}.start"))
-        object.__setattr__(self, "goal", checked(self.goal, f"{kind}.goal"))
-        object.__setattr__(self, "duration", _seconds(self.duration, f"{kind}.duration"))
-        _same_kind((self.start, self.goal), kind)
+        name = type(self).__name__
+        for end in ("start", "goal"):
+            object.__setattr__(self, end, checked(getattr(self, end), f"{name}.{end}"))
+        seconds = number(self.duration, f"{name}.duration", "a finite positive time in seconds", above=0.0)
+        object.__setattr__(self, "duration", seconds)
+        object.__setattr__(self, "kind", _common_kind((self.start, self.goal), name))
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`."""
-        if self.start is not AS_IS and self.goal is not AS_IS:
-            return self
-        start = here if self.start is AS_IS else self.start
-        goal = here if self.goal is AS_IS else self.goal
-        return type(self)(start, goal, self.duration)
+        here = _start(here, self.kind)
+        ends = {end: here for end in ("start", "goal") if getattr(self, end) is AS_IS}
+        return replace(self, **ends) if ends else self  # type: ignore[type-var]  # they are dataclasses
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class MinJerk(_Segment):
     """From rest at `start` to rest at `goal` in `duration` [s], with least jerk."""
+
+    start: Value
+    goal: Value
+    duration: float
 
     def at(self, t: float) -> Value:
         """See `Path.at`."""
@@ -172,6 +234,10 @@ class MinJerk(_Segment):
 class Line(_Segment):
     """From `start` to `goal` at constant speed in `duration` [s]; it starts and stops abruptly."""
 
+    start: Value
+    goal: Value
+    duration: float
+
     def at(self, t: float) -> Value:
         """See `Path.at`."""
         return _blend(self.start, self.goal, min(max(t / self.duration, 0.0), 1.0))
@@ -179,11 +245,12 @@ class Line(_Segment):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Swing(Path):
+class Swing(_Segment):
     """A foot's step: minimum jerk along the ground with a bump `height` [m] above it.
 
     Position: p(s) = start + (goal - start) m(s) + z height (4 s (1 - s))^3, s = t / duration, m the
-    minimum-jerk law. Speed and acceleration are zero at lift-off and at touch-down.
+    minimum-jerk law. Speed and acceleration are zero at lift-off and at touch-down. Between poses the foot
+    turns about one axis, with the same law.
     """
 
     start: Value
@@ -192,24 +259,19 @@ class Swing(Path):
     duration: float
 
     def __post_init__(self) -> None:
-        for field in ("start", "goal"):
-            object.__setattr__(self, field, checked(getattr(self, field), f"Swing.{field}"))
-        object.__setattr__(self, "duration", _seconds(self.duration, "Swing.duration"))
-        if not np.isfinite(self.height) or self.height < 0.0:
-            raise SpecError(f"Swing.height: expected a height in metres of 0 or more, got {self.height}")
-
-    def bind(self, here: Value) -> Path:
-        """See `Path.bind`."""
-        start = here if self.start is AS_IS else self.start
-        goal = here if self.goal is AS_IS else self.goal
-        return Swing(start, goal, self.height, self.duration)
+        super().__post_init__()
+        height = number(self.height, "Swing.height", "a height in metres of 0 or more", least=0.0)
+        object.__setattr__(self, "height", height)
+        if self.kind not in (None, POSE, POINT):
+            raise SpecError(f"Swing: expected {POSE} or {POINT} at both ends, got {self.kind}")
 
     def at(self, t: float) -> Value:
         """See `Path.at`."""
         s = min(max(t / self.duration, 0.0), 1.0)
-        point = np.array(_blend(self.start, self.goal, min_jerk(s)))
+        place = _blend(self.start, self.goal, min_jerk(s))
+        point = place.translation if isinstance(place, pin.SE3) else place
         point[2] += self.height * (4.0 * s * (1.0 - s)) ** 3
-        return point
+        return place
 
 
 @final
@@ -217,59 +279,88 @@ class Swing(Path):
 class Waypoints(Path):
     """A smooth path through `points` at `times` [s], at rest at its two ends.
 
-    Cubic splines with clamped ends; a pose's rotation is splined in the tangent space of its first
-    point, which asks that no point be turned by half a turn or more against the first.
+    Cubic splines with clamped ends; rotations are splined in the tangent space of the first one, as
+    rotation vectors that may pass half a turn. No point may be turned by half a turn against the one before.
     """
 
     times: tuple[float, ...]
     points: tuple[Value, ...]
+    _at: Callable[[float], Value] | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        times = tuple(float(t) for t in self.times)
+        for name in ("times", "points"):
+            if isinstance(getattr(self, name), str) or not isinstance(getattr(self, name), Iterable):
+                raise SpecError(f"Waypoints.{name}: expected a list, got {getattr(self, name)!r}")
+        times = tuple(number(t, f"Waypoints.times[{i}]", "seconds") for i, t in enumerate(self.times))
         points = tuple(checked(p, f"Waypoints.points[{i}]") for i, p in enumerate(self.points))
         if len(times) != len(points) or len(times) < 2:
-            raise SpecError(f"Waypoints: {len(times)} times for {len(points)} points; needs two or more of each")
-        if not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0) or times[0] != 0.0:
+            raise SpecError(
+                f"Waypoints: {len(times)} times for {len(points)} points; needs two or more of each"
+            )
+        if times[0] != 0.0 or min(np.diff(times)) <= 0.0:
             raise SpecError(f"Waypoints.times: expected 0 first, then growing, got {times}")
-        _same_kind(points, "Waypoints")
+        object.__setattr__(self, "kind", _common_kind(points, "Waypoints"))
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "points", points)
-        open_end = any(p is AS_IS for p in points)
-        object.__setattr__(self, "_at", None if open_end else self._spline())
-
-    def _spline(self) -> Callable[[float], Value]:
-        first, end = self.points[0], self.times[-1]
-        if isinstance(first, pin.SE3):
-            turns = [pin.log3(first.rotation.T @ p.rotation) for p in self.points]
-            rows = np.array([np.concatenate([p.translation, w]) for p, w in zip(self.points, turns, strict=True)])
-        else:
-            rows = np.array(self.points)
-        curve = CubicSpline(np.array(self.times), rows, bc_type="clamped")
-        pieces = [tuple(curve.c[:, i]) for i in range(len(self.times) - 1)]
-        knots = self.times
-
-        def at(t: float) -> Value:
-            t = min(max(t, 0.0), end)
-            piece = min(bisect_right(knots, t), len(pieces)) - 1
-            a, b, c, d = pieces[piece]
-            s = t - knots[piece]
-            row = ((a * s + b) * s + c) * s + d
-            if isinstance(first, pin.SE3):
-                return pin.SE3(first.rotation @ pin.exp3(row[3:]), row[:3])
-            return row
-
-        return at
+        if not any(p is AS_IS for p in points):
+            object.__setattr__(self, "_at", _spline(times, points))
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`."""
-        if self._at is not None:  # type: ignore[attr-defined]
+        if self._at is not None:
             return self
+        here = _start(here, self.kind)
         return Waypoints(self.times, tuple(here if p is AS_IS else p for p in self.points))
 
     def at(self, t: float) -> Value:
         """See `Path.at`."""
-        at: Callable[[float], Value] = self._at  # type: ignore[attr-defined]
-        return at(t)
+        return _blend(AS_IS, AS_IS, t) if self._at is None else self._at(t)
+
+
+def _spline(times: tuple[float, ...], points: tuple[Value, ...]) -> Callable[[float], Value]:
+    """The clamped cubic spline through points of one kind, as a function of time."""
+    first, end = points[0], times[-1]
+    if isinstance(first, pin.SE3):
+        turns = _rotation_vectors([p.rotation for p in points])
+        rows = np.column_stack([[p.translation for p in points], turns])
+    elif first.shape == (3, 3):
+        rows = _rotation_vectors(points)
+    else:
+        rows = np.array(points)
+    curve = CubicSpline(np.array(times), rows, bc_type="clamped")
+    pieces = [tuple(curve.c[:, i]) for i in range(len(times) - 1)]
+
+    def at(t: float) -> Value:
+        t = min(max(t, 0.0), end)
+        piece = min(bisect_right(times, t), len(pieces)) - 1
+        a, b, c, d = pieces[piece]
+        s = t - times[piece]
+        row = ((a * s + b) * s + c) * s + d
+        if isinstance(first, pin.SE3):
+            return pin.SE3(first.rotation @ pin.exp3(row[3:]), row[:3])
+        return first @ pin.exp3(row) if first.shape == (3, 3) else row
+
+    return at
+
+
+def _rotation_vectors(rotations: Sequence[Array]) -> Array:
+    """(N, 3) [rad], about the axes of the first rotation; each the one nearest to that before it.
+
+    A rotation by `angle` about `axis` is one by `angle + 2 pi k` too.
+    """
+    vectors = [np.zeros(3)]
+    for i, rotation in enumerate(rotations[1:], 1):
+        if np.linalg.norm(pin.log3(rotations[i - 1].T @ rotation)) > np.pi - 1e-6:
+            raise SpecError(
+                f"Waypoints.points[{i}]: turned by half a turn against points[{i - 1}], so that the way "
+                "round is open; put a point between"
+            )
+        vector = pin.log3(rotations[0].T @ rotation)
+        angle = float(np.linalg.norm(vector))
+        axis = vector / angle if angle > 1e-9 else vectors[-1] / max(float(np.linalg.norm(vectors[-1])), 1e-9)
+        vector = vector + axis * 2.0 * np.pi * np.round((vectors[-1] - vector) @ axis / (2.0 * np.pi))
+        vectors.append(vector)
+    return np.array(vectors)
 
 
 @final
@@ -280,22 +371,24 @@ class Live(Path):
 
     def __init__(self, value: Value) -> None:
         self._value = checked(value, "Live")
+        self.kind = kind_of(self._value)
 
     def set(self, value: Value) -> None:
         """Replace the target; refuses a value of another kind, NaN or infinity with `SpecError`."""
         new = checked(value, "Live.set")
-        _same_kind((self._value, new), "Live.set")
+        self.kind = _common_kind((self._value, new), "Live.set")
         self._value = new
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`; the path stays the caller's own object, which goes on setting it."""
         if self._value is AS_IS:
             self._value = checked(here, "Live")
+            self.kind = kind_of(self._value)
         return self
 
     def at(self, t: float) -> Value:
         """See `Path.at`."""
-        return self._value
+        return pin.SE3(self._value) if isinstance(self._value, pin.SE3) else self._value
 
 
 def as_path(target: Path | ArrayLike | AsIs | Value, what: str) -> Path:

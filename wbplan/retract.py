@@ -26,8 +26,14 @@ class Retraction:
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
 
-    def correct(self, q: Array, new: Array, kept: Callable[[], bool]) -> Array:
+    def correct(self, q: Array, new: Array, kept: Callable[[], bool], *, recovering: bool) -> Array:
         """Correct `new`, which a step from `q` led to, at most a few times; the stack then measures the result.
+
+        Args:
+            q: (nq,) where the tick started.
+            new: (nq,) where its step led.
+            kept: whether what the stack measures now is good enough.
+            recovering: the CoM comes from outside its margin.
 
         Returns:
             The last configuration tried: the caller judges it.
@@ -38,7 +44,7 @@ class Retraction:
         for _ in range(MOST):
             taken = np.zeros(len(free))
             taken[6:] = new[7:][free[6:] - 6] - q[7:][free[6:] - 6]
-            stack.linearise()
+            stack.linearise(recovering=recovering)
             x = self._solve(lower - taken, upper - taken)
             if x is None:
                 return new

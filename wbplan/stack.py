@@ -8,31 +8,38 @@
 D and h hold what is diagonal: posture, damping, and a curvature damping. A Gauss-Newton step neglects the
 curvature of a task's error; near a stretched limb the true Hessian then exceeds J'J by up to
 |error| x (lever arm), and full steps chatter about the nearest reachable point for ever. Adding
-weight^2 gain |error| x (1 m, or 1 rad) to the diagonal bounds that curvature from above, so steps settle;
-for a target that is tracked the term vanishes with the error.
+weight^2 gain |error| x (half the lever arm, or 1/2 for rotations) to the diagonal keeps every step short of
+twice the way to the optimum, so steps settle; for a target that is tracked the term vanishes with the error.
 """
 
 from __future__ import annotations
 
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.compiled import ComTarget, CompiledPhase, JointTarget
+from wbplan.compiled import WORLD, ComTarget, CompiledPhase, JointTarget
+from wbplan.geometry import HalfPlanes
 from wbplan.kinematics import Kinematics
 from wbplan.rows import FrameRows
 
 Array = NDArray[np.float64]
-
-#: Bound on the curvature of an error, per unit of error: lever arms [m], and 1 for rotations.
-LEVER = 1.0
 
 #: Always on the diagonal [1/rad^2]: keeps the cost strictly convex where nothing is asked.
 REGULARISATION = 1e-6
 
 #: The tick stays this far [m] inside the promised margin: its row is linear, the CoM's path is not.
 MARGIN_RESERVE = 1e-4
+
+
+def reach(model: Any, frame: int) -> float:
+    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
+    if frame == WORLD:
+        return 0.0
+    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
+    links = [model.jointPlacements[j].translation for j in joints] + [model.frames[frame].placement.translation]
+    return float(sum(np.linalg.norm(link) for link in links))
 
 
 @final
@@ -121,7 +128,7 @@ class Stack:
                 gains.append(np.full(len(axes), c.gain))
         self._weight = np.concatenate(weights)
         self._pull = 1.0 - np.exp(-np.concatenate(gains) * self.dt)
-        self._curvature = LEVER * self._weight**2 * self._pull
+        self._curvature = 0.5 * self._lever() * self._weight**2 * self._pull
         self._weighted = np.zeros((n_soft, nf))
         self._weight_column, self._minus_weight = self._weight[:, None], -self._weight
         self.hard_error = np.zeros(self.n_hard)
@@ -134,6 +141,17 @@ class Stack:
         self._com_goal = [np.array(c.path.at(0.0), dtype=float) for c, _ in self._coms]
         self._com_step = [np.zeros(3) for _ in self._coms]
         self.driven_step = np.zeros(len(self.driven))
+
+    def _lever(self) -> Array:
+        """Bound on the curvature of each soft row's error, per unit of error: lever arm [m], or 1 for a rotation."""
+        model, levers = self.phase.model, []
+        for target, (_, positions, _, rotations) in zip(self.rows.targets, self.rows.spans, strict=True):
+            if not target.hard:
+                arm = max(reach(model, target.frame), reach(model, target.root))
+                levers += [arm] * positions + [1.0] * rotations
+        longest = max(reach(model, k) for k in range(len(model.frames)))
+        levers += [longest for com, axes in self._coms if not com.hard for _ in axes]
+        return np.array(levers)
 
     def _joint_box(self) -> None:
         """Bounds of the free joints; the base (first six columns) has none."""
@@ -293,22 +311,33 @@ class Stack:
         polygon, limit = self.phase.polygon, self.phase.phase.support
         if polygon is None or limit is None:
             return
-        kin = self.kinematics
-        J = kin.com_jacobian[:2]
+        J = self.kinematics.com_jacobian[:2]
         np.matmul(polygon.normals, J.take(self._free, axis=1), out=self.C)
-        room = polygon.offsets - polygon.normals @ kin.com[:2] - (limit.margin + MARGIN_RESERVE)
-        np.maximum(room, -limit.recovery_speed * self.dt, out=self.d)
+        np.maximum(self._room(polygon, limit.margin), -limit.recovery_speed * self.dt, out=self.d)
         if self._driving:
             self.d -= polygon.normals @ (J[:, self.driven] @ self.driven_step)
 
-    def linearise(self) -> None:
-        """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves."""
+    def _room(self, polygon: HalfPlanes, margin: float) -> Array:
+        """(E,) how far [m] the CoM may still move towards each edge; negative where it has to come back."""
+        room: Array = polygon.offsets - polygon.normals @ self.kinematics.com[:2] - (margin + MARGIN_RESERVE)
+        return room
+
+    def linearise(self, *, recovering: bool) -> None:
+        """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves.
+
+        Args:
+            recovering: the CoM comes from outside the margin, so the correction need not bring it inside.
+        """
         motion, steps, driving = self.rows.motion.copy(), self._com_step, self._driving
         self.rows.motion[:], self._com_step, self._driving = 0.0, [np.zeros(3) for _ in steps], False
         lower, upper = self.lower.copy(), self.upper.copy()
         self.assemble()
         self.rows.motion[:], self._com_step, self._driving = motion, steps, driving
         self.lower[:], self.upper[:] = lower, upper
+        polygon, limit = self.phase.polygon, self.phase.phase.support
+        if polygon is not None and limit is not None:
+            room = self._room(polygon, limit.margin)
+            self.d[:] = np.maximum(room, 0.0) if recovering else room
 
     def reach(self, column: int) -> float:
         """How far [m or rad] the speed limit lets a free column move in one tick."""

@@ -11,16 +11,17 @@ weight of zero on an axis leaves that row out, hard or soft.
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.errors import SpecError
-from wbplan.paths import AS_IS, AsIs, Path, as_path
+from wbplan.errors import SpecError, listing
+from wbplan.paths import AS_IS, NUMBER, POINT, POSE, ROTATION, AsIs, Path, as_path, name_of, number
 from wbplan.state import State
 
 Array = NDArray[np.float64]
@@ -29,20 +30,54 @@ Array = NDArray[np.float64]
 GAIN = 20.0
 
 
-def _weights(value: object, shape: tuple[int, ...], what: str) -> Array:
+def _weights(value: object, count: int, what: str) -> Array:
+    """Read-only (count,) weights from one number or `count` of them."""
+    expected = "a finite number of 0 or more" + (f", or {count} of them" if count > 1 else "")
     try:
-        weights = np.array(np.broadcast_to(np.asarray(value, dtype=float), shape))
-    except (TypeError, ValueError):
-        raise SpecError(f"{what}: expected a number or {shape[0]} numbers, got {value!r}") from None
+        given = np.array(value)
+    except ValueError:  # lists of different lengths
+        given = np.array(None)
+    if given.shape not in ((), (count,)) or given.dtype.kind not in "biuf":
+        raise SpecError(f"{what}: expected {expected}, got {value!r}")
+    weights = np.array(np.broadcast_to(given, (count,)), dtype=np.float64)
     if not np.isfinite(weights).all() or (weights < 0.0).any():
-        raise SpecError(f"{what}: expected finite numbers of 0 or more, got {value!r}")
+        raise SpecError(f"{what}: expected {expected}, got {value!r}")
     weights.setflags(write=False)
     return weights
 
 
-def _gain(value: float, what: str) -> None:
-    if not value > 0.0:
-        raise SpecError(f"{what}: expected a positive rate [1/s], got {value}")
+def _weight(value: object, what: str) -> float:
+    return number(value, what, "a finite number of 0 or more", least=0.0)
+
+
+def _pose_weights(value: Any, what: str) -> tuple[Array, Array]:
+    """A pose's weight as (3,) and (3,): from one number, a pair (each a number or three), or six."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) and len(value) == 2:
+        return _weights(value[0], 3, f"{what}[0]"), _weights(value[1], 3, f"{what}[1]")
+    both = _weights(value, 6, what)
+    return both[:3], both[3:]
+
+
+def check_kind(kind: str | None, what: str, takes: tuple[str, ...]) -> None:
+    """Refuse a target that is not of a kind that its task takes."""
+    if kind not in takes:
+        raise SpecError(f"{what}: expected {' or '.join(takes)}, got {kind}")
+
+
+def _target(target: Any, what: str, takes: tuple[str, ...]) -> Path:
+    """The target as a path, of a kind that its task takes as far as is known yet."""
+    path = as_path(target, what)
+    if path.kind is not None:
+        check_kind(path.kind, what, takes)
+    return path
+
+
+def _by_joint(given: Mapping[str, Any], what: str, convert: Callable[[Any, str], Any]) -> Mapping[str, Any]:
+    """A read-only copy with its values checked: joint -> value."""
+    if not given:
+        raise SpecError(f"{what}: expected one joint or more, got none")
+    names = [name_of(joint, f"{what}: joint") for joint in given]
+    return MappingProxyType({name: convert(given[name], f"{what}['{name}']") for name in names})
 
 
 class Task(abc.ABC):
@@ -56,6 +91,13 @@ class Task(abc.ABC):
     def label(self) -> str:
         """The task's name in reports and errors: as given, else made of its kind and frame."""
 
+    def _check(self) -> None:
+        """Refuse a name or gain that is none."""
+        if self.name is not None:
+            name_of(self.name, f"{type(self).__name__}.name")
+        gain = number(self.gain, f"{self.label}.gain", "a finite positive rate [1/s]", above=0.0)
+        object.__setattr__(self, "gain", gain)
+
 
 class FrameTask(Task):
     """A task on a frame's pose in a root frame, or in the world.
@@ -65,12 +107,16 @@ class FrameTask(Task):
     Attributes:
         frame: the frame.
         root: the frame that the target is given in; `None` is the world.
+        kind: first word of the label.
+        takes: kinds of targets.
     """
 
     frame: str
     root: str | None = None
     target: Any
+    weight: Any
     kind: ClassVar[str]
+    takes: ClassVar[tuple[str, ...]] = (POSE,)
 
     @property
     def label(self) -> str:
@@ -92,27 +138,33 @@ class FrameTask(Task):
         """The target as a path."""
         return as_path(self.target, f"{self.label}.target")
 
-    def _check_target(self, vector: tuple[int, ...] | None) -> None:
-        path = self.path
-        if path.constant and not isinstance(path.at(0.0), AsIs):
-            shape = getattr(path.at(0.0), "shape", None)
-            if shape is not None and shape != vector:
-                wanted = "pin.SE3" if vector is None else f"pin.SE3 or an array of shape {vector}"
-                raise SpecError(f"{self.label}.target: expected {wanted}, got an array of shape {shape}")
-        object.__setattr__(self, "target", path)
+    def _check(self) -> None:
+        name_of(self.frame, f"{type(self).__name__}.frame")
+        super()._check()
+        object.__setattr__(self, "target", _target(self.target, f"{self.label}.target", self.takes))
 
 
-def _pose_weights(value: object, what: str) -> tuple[Array, Array]:
-    """A pose's weight as (3,) and (3,): from one number, a pair (each a number or three), or six."""
-    if isinstance(value, Sequence) and len(value) == 2:
-        return _weights(value[0], (3,), f"{what}[0]"), _weights(value[1], (3,), f"{what}[1]")
-    both = _weights(value, (6,), what)
-    return both[:3], both[3:]
+class _WholePoseTask(FrameTask):
+    """A frame task on position and orientation; `weight` becomes a pair of arrays (3,)."""
+
+    def _check(self) -> None:
+        super()._check()
+        object.__setattr__(self, "weight", _pose_weights(self.weight, f"{self.label}.weight"))
+
+    @property
+    def position_weight(self) -> Array:
+        """See `FrameTask.position_weight`."""
+        return np.asarray(self.weight[0], dtype=np.float64)
+
+    @property
+    def rotation_weight(self) -> Array:
+        """See `FrameTask.rotation_weight`."""
+        return np.asarray(self.weight[1], dtype=np.float64)
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class PoseTask(FrameTask):
+class PoseTask(_WholePoseTask):
     """A frame's position and orientation in the world.
 
     Args:
@@ -131,24 +183,12 @@ class PoseTask(FrameTask):
     kind: ClassVar[str] = "pose"
 
     def __post_init__(self) -> None:
-        _pose_weights(self.weight, f"{self.label}.weight")
-        _gain(self.gain, f"{self.label}.gain")
-        self._check_target(None)
-
-    @property
-    def position_weight(self) -> Array:
-        """See `FrameTask.position_weight`."""
-        return _pose_weights(self.weight, "weight")[0]
-
-    @property
-    def rotation_weight(self) -> Array:
-        """See `FrameTask.rotation_weight`."""
-        return _pose_weights(self.weight, "weight")[1]
+        self._check()
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class RelativePoseTask(FrameTask):
+class RelativePoseTask(_WholePoseTask):
     """A frame's pose in another frame, `root`: T_root_frame.
 
     A hard one with a target that does not move is a closed loop, as when two limbs clamp one object.
@@ -171,26 +211,15 @@ class RelativePoseTask(FrameTask):
     kind: ClassVar[str] = "relative"
 
     def __post_init__(self) -> None:
+        name_of(self.root, f"{type(self).__name__}.root")
         if self.frame == self.root:
             raise SpecError(f"{self.label}: frame and root are the same, '{self.root}'")
-        _pose_weights(self.weight, f"{self.label}.weight")
-        _gain(self.gain, f"{self.label}.gain")
-        self._check_target(None)
+        self._check()
 
     @property
     def label(self) -> str:
         """See `Task.label`."""
         return self.name or f"{self.kind}({self.frame} in {self.root})"
-
-    @property
-    def position_weight(self) -> Array:
-        """See `FrameTask.position_weight`."""
-        return _pose_weights(self.weight, "weight")[0]
-
-    @property
-    def rotation_weight(self) -> Array:
-        """See `FrameTask.rotation_weight`."""
-        return _pose_weights(self.weight, "weight")[1]
 
 
 @final
@@ -212,16 +241,16 @@ class PositionTask(FrameTask):
     gain: float = GAIN
     name: str | None = None
     kind: ClassVar[str] = "position"
+    takes: ClassVar[tuple[str, ...]] = (POSE, POINT)
 
     def __post_init__(self) -> None:
-        _weights(self.weight, (3,), f"{self.label}.weight")
-        _gain(self.gain, f"{self.label}.gain")
-        self._check_target((3,))
+        self._check()
+        object.__setattr__(self, "weight", _weights(self.weight, 3, f"{self.label}.weight"))
 
     @property
     def position_weight(self) -> Array:
         """See `FrameTask.position_weight`."""
-        return _weights(self.weight, (3,), "weight")
+        return np.asarray(self.weight, dtype=np.float64)
 
 
 @final
@@ -243,16 +272,16 @@ class OrientationTask(FrameTask):
     gain: float = GAIN
     name: str | None = None
     kind: ClassVar[str] = "orientation"
+    takes: ClassVar[tuple[str, ...]] = (POSE, ROTATION)
 
     def __post_init__(self) -> None:
-        _weights(self.weight, (3,), f"{self.label}.weight")
-        _gain(self.gain, f"{self.label}.gain")
-        self._check_target((3, 3))
+        self._check()
+        object.__setattr__(self, "weight", _weights(self.weight, 3, f"{self.label}.weight"))
 
     @property
     def rotation_weight(self) -> Array:
         """See `FrameTask.rotation_weight`."""
-        return _weights(self.weight, (3,), "weight")
+        return np.asarray(self.weight, dtype=np.float64)
 
 
 @final
@@ -271,14 +300,12 @@ class ComTask(Task):
     weight: Any = 1.0
     gain: float = GAIN
     name: str | None = None
+    takes: ClassVar[tuple[str, ...]] = (POINT,)
 
     def __post_init__(self) -> None:
-        _weights(self.weight, (3,), f"{self.label}.weight")
-        _gain(self.gain, f"{self.label}.gain")
-        path = as_path(self.target, f"{self.label}.target")
-        if path.constant and path.at(0.0) is not AS_IS and np.shape(path.at(0.0)) != (3,):
-            raise SpecError(f"{self.label}.target: expected three numbers [m], got {path.at(0.0)}")
-        object.__setattr__(self, "target", path)
+        self._check()
+        object.__setattr__(self, "weight", _weights(self.weight, 3, f"{self.label}.weight"))
+        object.__setattr__(self, "target", _target(self.target, f"{self.label}.target", self.takes))
 
     @property
     def label(self) -> str:
@@ -288,7 +315,7 @@ class ComTask(Task):
     @property
     def position_weight(self) -> Array:
         """Weights (3,) [1/m] along the world's axes."""
-        return _weights(self.weight, (3,), "weight")
+        return np.asarray(self.weight, dtype=np.float64)
 
     @property
     def path(self) -> Path:
@@ -317,19 +344,28 @@ class PostureTask(Task):
     name: str | None = None
 
     def __post_init__(self) -> None:
-        _gain(self.gain, f"{self.label}.gain")
+        self._check()
+        put = partial(object.__setattr__, self)
+        at = f"{self.label}."
         if isinstance(self.weight, Mapping):
-            for joint, weight in self.weight.items():
-                _weights(weight, (1,), f"{self.label}.weight['{joint}']")
+            put("weight", _by_joint(self.weight, f"{at}weight", _weight))
         else:
-            _weights(self.weight, (1,), f"{self.label}.weight")
+            put("weight", _weight(self.weight, f"{at}weight"))
         if isinstance(self.target, Mapping):
-            paths = {j: as_path(value, f"{self.label}.target['{j}']") for j, value in self.target.items()}
-            object.__setattr__(self, "target", MappingProxyType(paths))
+            put("target", _by_joint(self.target, f"{at}target", partial(_target, takes=(NUMBER,))))
         elif not isinstance(self.target, State | AsIs):
-            raise SpecError(f"{self.label}.target: expected joint values by name, a State or AS_IS, got {self.target!r}")
-        if self.joints is not None:
-            object.__setattr__(self, "joints", tuple(self.joints))
+            raise SpecError(
+                f"{at}target: expected joint values by name, a State or AS_IS, got {self.target!r}"
+            )
+        if self.joints is None:
+            return
+        given: Any = self.joints
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise SpecError(f"{at}joints: expected a list of joints, got {given!r}")
+        put("joints", tuple(_by_joint(dict.fromkeys(given), f"{at}joints", lambda _, __: None)))
+        left = [j for j in self.target if j not in self.joints] if isinstance(self.target, Mapping) else []
+        if left:
+            raise SpecError(f"{at}target: {listing(left)} not among its joints: {listing(self.joints)}")
 
     @property
     def label(self) -> str:
@@ -349,13 +385,13 @@ class DampingTask(Task):
 
     weight: float = 0.01
     name: str | None = None
-    gain: float = GAIN
+    gain: float = field(default=GAIN, init=False, repr=False)  # every task has one; it has no error to remove
 
     def __post_init__(self) -> None:
-        _weights(self.weight, (1,), f"{self.label}.weight")
+        self._check()
+        object.__setattr__(self, "weight", _weight(self.weight, f"{self.label}.weight"))
 
     @property
     def label(self) -> str:
         """See `Task.label`."""
         return self.name or "damping"
-

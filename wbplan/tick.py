@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from wbplan.backends import make_backend
 from wbplan.compiled import CompiledPhase, compile_phase
+from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError
 from wbplan.qp import Solution
 from wbplan.retract import DRIFT, Retraction
@@ -205,20 +206,30 @@ class Loop:
         stack.measure(new)
         if self._kept(before):
             return new
-        new = self._retraction.correct(q, new, lambda: self._kept(before))
+        promised = self.compiled.margin
+        recovering = promised is not None and before < promised
+        new = self._retraction.correct(q, new, lambda: self._kept(before), recovering=recovering)
         worst = int(np.abs(stack.hard_error).argmax()) if stack.n_hard else -1
-        if worst >= 0 and abs(stack.hard_error[worst]) > PROMISE:
-            label, unit = stack.hard_names()[worst]
-            raise SolveError(
-                f"phase '{self.compiled.phase.name}': '{label}' is off by {abs(stack.hard_error[worst]):.3g} {unit} "
-                f"after the step, {PROMISE:.0e} is allowed; move slower or use a smaller dt"
-            )
+        if worst >= 0 and not abs(stack.hard_error[worst]) <= PROMISE:
+            raise self._off(q, *stack.hard_names()[worst], abs(float(stack.hard_error[worst])))
         if not self._margin_kept(before):
             raise SolveError(
                 f"phase '{self.compiled.phase.name}': the step leaves a stability margin of {stack.margin:.5f} m, "
                 f"{self.compiled.margin} m is promised; move slower or use a smaller dt"
             )
         return new
+
+    def _off(self, q: Array, label: str, unit: str, by: float) -> SolveError:
+        """Why a hard row could not be put right: hard rows that contradict each other, or too long a step."""
+        self.stack.measure(q)
+        self.stack.assemble()
+        error = solve_error(self.stack, "the step breaks a hard row")
+        if error.clashes:
+            return error
+        return SolveError(
+            f"phase '{self.compiled.phase.name}': '{label}' is off by {by:.3g} {unit} after the step, "
+            f"{PROMISE:.0e} is allowed; move slower or use a smaller dt"
+        )
 
     def _kept(self, before: float) -> bool:
         stack = self.stack

@@ -314,6 +314,14 @@ def test_the_report_as_data_and_as_a_table(machine: ModuleType, good: Bundle) ->
         report["no such promise"]
 
 
+def test_a_recorded_margin_need_not_know_of_a_small_slip(machine: ModuleType, good: Bundle) -> None:
+    slipped = machine.build(
+        foot=lambda t: machine.foot_path(t) - [0.0, 8e-5 * machine.blend((t - 0.8) / 0.6), 0.0]
+    )
+    assert check(slipped)["foot slip"].worst > 7e-5
+    assert check(slipped).ok
+
+
 # ---------------------------------------------------------------------------------- phases without a margin
 
 

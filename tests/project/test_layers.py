@@ -37,6 +37,7 @@ LAYERS = [
     "recorder",
     "planner",
     "taskfile",
+    "bench",
     "live",
     "printing",
     "cli",

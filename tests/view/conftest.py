@@ -134,9 +134,12 @@ def load_browser():
     return sys.modules["view_browser"]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def context():
-    """One headless Chromium for all tests."""
+    """One headless Chromium for all tests of a file.
+
+    Not for the session: while it is open, an event loop runs in this thread and no other test can run one.
+    """
     browser = load_browser()
     missing = browser.why_not()
     if missing:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from wbplan.checks.replay import Array, Replay, Window
@@ -18,11 +17,19 @@ SIDES = 64  #: of the pyramid around a friction cone
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """A phase's CoM and its margin over the phase's samples; no margin where there is no polygon."""
+    """A phase's CoM and its margin over the phase's samples; no margin where there is no polygon.
+
+    Attributes:
+        window: the phase.
+        com: (K, 3) [m], world.
+        margin: (K,) [m], in the polygon of the feet as they are at each sample.
+        margin_at_rest: (K,) [m], in the polygon of the feet as they are when the phase begins.
+    """
 
     window: Window
     com: Array
     margin: Array | None
+    margin_at_rest: Array | None
 
 
 def rows(replay: Replay, bounds: Tolerances) -> list[Row]:
@@ -41,12 +48,14 @@ def _balance(replay: Replay, window: Window) -> _Balance:
     com = replay.total_com(window, window.samples)
     try:
         if "region" in window.promises:
-            return _Balance(window, com, support_polygon(window.promises["region"]).margins(com[:, :2]))
+            margin = support_polygon(window.promises["region"]).margins(com[:, :2])
+            return _Balance(window, com, margin, margin)
         points = np.array([replay.frames[foot].position[window.samples, :2] for foot in window.feet])
-        edges = support_polygon(points[:, 0] if len(points) else np.zeros((0, 2))).edges
+        polygon = support_polygon(points[:, 0] if len(points) else np.zeros((0, 2)))
     except SpecError:  # fewer than three feet, or all on a line
-        return _Balance(window, com, None)
-    return _Balance(window, com, _margins_of_moving(points, edges, com[:, :2]))
+        return _Balance(window, com, None, None)
+    moving = _margins_of_moving(points, polygon.edges, com[:, :2])
+    return _Balance(window, com, moving, polygon.margins(com[:, :2]))
 
 
 def _margins_of_moving(points: Array, edges: tuple[tuple[int, int], ...], com: Array) -> Array:
@@ -102,7 +111,11 @@ def _margins(replay: Replay, phases: list[_Balance]) -> list[Row]:
 
 
 def _records(replay: Replay, phases: list[_Balance]) -> list[Row]:
-    """The recorded `com` and `margin` are those of the recorded phase."""
+    """The recorded `com` and `margin` are those of the recorded phase.
+
+    A recorded margin may be the one in the polygon of the feet when the phase began: a planner need not
+    know how far they slipped since. The promise is held against the feet as they are.
+    """
     com, margin = Worst("com agrees with q", "m"), Worst("margin agrees with q", "m")
     for phase in phases:
         window = phase.window
@@ -111,20 +124,14 @@ def _records(replay: Replay, phases: list[_Balance]) -> list[Row]:
         times = replay.times(samples)
         off = np.linalg.norm(replay.record.com[samples] - phase.com[own], axis=1)
         com.see(off, 1e-9, times, window.name, ["CoM"])
-        recorded = replay.record.margin[samples]
-        if phase.margin is None:
+        if phase.margin is None or phase.margin_at_rest is None:
             continue
-        if window.margin is None:  # a margin that nobody asked for may be left out, but not be wrong
-            own_margin, times, recorded = _known(phase.margin[own], times, recorded)
-        else:
-            own_margin = phase.margin[own]
-        margin.see(np.abs(recorded - own_margin), 1e-6, times, window.name, ["CoM"])
+        recorded = replay.record.margin[samples]
+        off = np.minimum(np.abs(recorded - phase.margin[own]), np.abs(recorded - phase.margin_at_rest[own]))
+        # A margin that nobody asked for may be left out, but not be wrong.
+        counts = np.isfinite(recorded) if window.margin is None else np.ones(len(samples), dtype=np.bool_)
+        margin.see(off[counts], 1e-6, times[counts], window.name, ["CoM"])
     return [*com.rows(), *margin.rows()]
-
-
-def _known(margin: Array, times: Array, recorded: Array) -> tuple[Array, Array, Array]:
-    known: NDArray[np.bool_] = np.isfinite(recorded)
-    return margin[known], times[known], recorded[known]
 
 
 def _regions(replay: Replay) -> list[Row]:
