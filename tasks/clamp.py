@@ -28,7 +28,7 @@ SIX = ("limb1_foot", "limb2_foot", *CARRIERS)
 REAR_AND_ARMS = ("limb1_foot", "limb2_foot", "leg4_foot", "leg5_foot")
 
 BOX_SIZE = (0.25, 0.15, 0.12)  # [m]
-BACK = -0.02  # where the body is kept [m] along y while the arms are ahead of it
+BACK = -0.01  # where the body is kept [m] along y while the arms are ahead of it
 TALL = 0.275  # body height [m] for stepping: the shanks' limit of 60 degrees leaves a lower body's feet no room to rise
 STEP = 0.03  # how high feet rise [m]
 
@@ -128,9 +128,9 @@ def script(
         (0.0, 2.0, 4.0, 6.0, 8.0),
         (
             wb.AS_IS,
-            beside((0.03, 0.00, lift + 0.03), (4.0, 0.0, 6.0)),
-            beside((0.00, 0.02, lift + 0.02), (2.0, 6.0, 0.0)),
-            beside((-0.03, 0.00, lift + 0.03), (4.0, 0.0, -6.0)),
+            beside((0.02, 0.00, lift + 0.03), (4.0, 0.0, 5.0)),
+            beside((0.00, 0.02, lift + 0.02), (3.0, 5.0, 0.0)),
+            beside((-0.02, 0.00, lift + 0.03), (4.0, 0.0, -5.0)),
             above,
         ),
     )

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbplan.errors import SpecError
-from wbplan.paths import AS_IS, AsIs, checked
+from wbplan.paths import AS_IS, POINT, POSE, AsIs, checked, kind_of, name_of, number
+from wbplan.robot import Robot
+from wbplan.state import State, find_frame
 
 
 @final
@@ -31,19 +36,31 @@ class Body:
     com: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not self.name:
-            raise SpecError("Body.name: expected a name, got an empty string")
-        if not (np.isfinite(self.mass) and self.mass >= 0.0):
-            raise SpecError(f"Body '{self.name}'.mass: expected kilograms of 0 or more, got {self.mass}")
+        at = f"Body '{name_of(self.name, 'Body.name')}'"
+        mass = number(self.mass, f"{at}.mass", "kilograms of 0 or more", least=0.0)
+        object.__setattr__(self, "mass", mass)
         for name in ("size", "com"):
-            value = checked(getattr(self, name), f"Body '{self.name}'.{name}")
-            if np.shape(value) != (3,):
-                raise SpecError(f"Body '{self.name}'.{name}: expected three numbers [m], got {value}")
+            value = checked(getattr(self, name), f"{at}.{name}")
+            if kind_of(value) != POINT:
+                raise SpecError(f"{at}.{name}: expected three numbers [m], got {value}")
             object.__setattr__(self, name, tuple(float(x) for x in value))
         if min(self.size) <= 0.0:
-            raise SpecError(f"Body '{self.name}'.size: expected positive lengths [m], got {self.size}")
+            raise SpecError(f"{at}.size: expected positive lengths [m], got {self.size}")
         if self.pose is not None:
-            object.__setattr__(self, "pose", checked(self.pose, f"Body '{self.name}'.pose"))
+            object.__setattr__(self, "pose", _pose(self.pose, f"{at}.pose"))
+
+    def same_as(self, other: Body) -> bool:
+        """Whether the two are alike in every field, the pose too."""
+        if self.pose is None or other.pose is None:
+            return self == other and self.pose is other.pose
+        return self == other and bool(self.pose.isApprox(other.pose, 1e-12))
+
+
+def _pose(value: object, what: str) -> Any:
+    pose = checked(value, what)
+    if kind_of(pose) != POSE:
+        raise SpecError(f"{what}: expected {POSE}, got {value!r}")
+    return pose
 
 
 @final
@@ -65,5 +82,67 @@ class Carried:
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):
             raise SpecError(f"Carried.body: expected a wb.Body, got {self.body!r}")
+        name_of(self.by, f"Carried '{self.body.name}'.by")
         if not isinstance(self.pose, AsIs):
-            object.__setattr__(self, "pose", checked(self.pose, f"Carried '{self.body.name}'.pose"))
+            object.__setattr__(self, "pose", _pose(self.pose, f"Carried '{self.body.name}'.pose"))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A carried body: its pose in the holding frame, and its own frame's number in the phase's model."""
+
+    body: Body
+    holder: str
+    T_holder_body: Any
+    frame: int
+
+
+def frame_number(model: pin.Model, name: str, what: str) -> int:
+    """A frame's number in the model; `what` names the field in the `SpecError` where there is none."""
+    try:
+        return find_frame(model, name)
+    except SpecError as error:
+        raise SpecError(f"{what}: {error}") from None
+
+
+def with_carried(
+    robot: Robot, carried: Sequence[Carried], q: NDArray[np.float64], placed: Mapping[str, Any], what: str
+) -> tuple[pin.Model, tuple[Held, ...]]:
+    """The robot's model with each carried body added as a frame and a mass of its holder.
+
+    Args:
+        robot: the robot; its model is copied before it is changed.
+        carried: what is carried.
+        q: (nq,) configuration at the phase's start.
+        placed: pose in the world of every body that stands somewhere, by name.
+        what: the field, for messages.
+
+    Raises:
+        SpecError: a holder does not exist, or a body has a frame's name.
+    """
+    if not carried:
+        return robot.model, ()
+    model = pin.Model(robot.model)
+    state = State(robot.model, q)
+    held = []
+    for item in carried:
+        body = item.body
+        by = frame_number(robot.model, item.by, f"{what}: body '{body.name}'.by")
+        holder = model.frames[by]
+        if model.existFrame(body.name):
+            raise SpecError(f"{what}: body '{body.name}' has the name of a frame of {robot.name}")
+        if item.pose is not AS_IS:
+            pose = item.pose
+        elif body.name in placed:
+            pose = state.pose(item.by).actInv(placed[body.name])
+        else:
+            pose = pin.SE3.Identity()
+        placement = holder.placement * pose
+        x, y, z = body.size
+        inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()
+        inertia.lever = np.array(body.com)
+        frame = pin.Frame(body.name, holder.parentJoint, by, placement, pin.FrameType.BODY)
+        held.append(Held(body, item.by, pose, model.addFrame(frame)))
+        model.appendBodyToJoint(holder.parentJoint, inertia, placement)
+    return model, tuple(held)

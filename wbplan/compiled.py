@@ -10,17 +10,16 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.bodies import Body
+from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
-from wbplan.paths import AS_IS, Hold, MinJerk, Path
+from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
 from wbplan.state import State, find_frame
-from wbplan.tasks import ComTask, DampingTask, FrameTask, PostureTask
+from wbplan.tasks import ComTask, DampingTask, PostureTask, check_kind
 
 Array = NDArray[np.float64]
 WORLD = -1
@@ -90,17 +89,6 @@ class Driven:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Held:
-    """A carried body: its pose in the holding frame, and its own frame's number in the phase's model."""
-
-    body: Body
-    holder: str
-    T_holder_body: Any
-    frame: int
-
-
-@final
-@dataclass(frozen=True, eq=False)
 class CompiledPhase:
     """A phase on a robot, from a start configuration.
 
@@ -155,8 +143,8 @@ def compile_phase(
         SpecError: a name does not exist, or two parts of the phase do not fit.
     """
     at = f"phase '{phase.name}'"
-    now = dict(roles) if roles is not None else {limb: robot.role_of(limb, q) for limb in robot.roles}
-    model, held = _with_carried(robot, phase, q, placed or {})
+    now = _roles_now(robot, q, roles or {})
+    model, held = with_carried(robot, phase.carried, q, placed or {}, f"{at}.carried")
     state = State(model, q)
     driven = _driven(robot, phase, state, now)
     given = {d.joint for d in driven}
@@ -171,143 +159,207 @@ def compile_phase(
         except SpecError as error:
             names = ", ".join(c.frame for c in phase.contacts) or "none"
             raise SpecError(f"{at}: its contacts ({names}) span no support polygon: {error}") from None
+    tasks = (*phase.hard, *phase.soft)
     coms = tuple(
-        ComTarget(t.label, t.path.bind(state.com), t.position_weight, t.gain, t in phase.hard)
-        for t in (*phase.hard, *phase.soft)
+        ComTarget(
+            t.label,
+            _bound(t.path, state.com, f"{at}, {t.label}.target", t.takes),
+            t.position_weight,
+            t.gain,
+            t in phase.hard,
+        )
+        for t in tasks
         if isinstance(t, ComTask)
     )
     joints = tuple(
-        _joint_target(robot, t, q, given, t in phase.hard, at)
-        for t in (*phase.hard, *phase.soft)
-        if isinstance(t, PostureTask)
+        _joint_target(robot, t, q, given, t in phase.hard, at) for t in tasks if isinstance(t, PostureTask)
     )
     damping = float(sum(t.weight**2 for t in phase.soft if isinstance(t, DampingTask)))
     return CompiledPhase(
-        robot, phase, model, np.array(q), frames, coms, joints, damping, free, driven, polygon, points, held,
+        robot,
+        phase,
+        model,
+        np.array(q),
+        frames,
+        coms,
+        joints,
+        damping,
+        free,
+        driven,
+        polygon,
+        points,
+        held,
         {**now, **phase.roles},
     )
 
 
-def _with_carried(robot: Robot, phase: Phase, q: Array, placed: Mapping[str, Any]) -> tuple[Any, tuple[Held, ...]]:
-    """The robot's model with each carried body added as a frame and a mass of its holder."""
-    if not phase.carried:
-        return robot.model, ()
-    model = pin.Model(robot.model)
-    state = State(robot.model, q)
-    held = []
-    for item in phase.carried:
-        body, holder = item.body, model.frames[robot.frame_id(item.by)]
-        if model.existFrame(body.name):
-            raise SpecError(f"phase '{phase.name}': body '{body.name}' has the name of a frame of {robot.name}")
-        if item.pose is not AS_IS:
-            pose = item.pose
-        elif body.name in placed:
-            pose = state.pose(item.by).actInv(placed[body.name])
-        else:
-            pose = pin.SE3.Identity()
-        placement = holder.placement * pose
-        x, y, z = body.size
-        inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()
-        inertia.lever = np.array(body.com)
-        frame = pin.Frame(body.name, holder.parentJoint, robot.frame_id(item.by), placement, pin.FrameType.BODY)
-        number = model.addFrame(frame)
-        model.appendBodyToJoint(holder.parentJoint, inertia, placement)
-        held.append(Held(body, item.by, pose, number))
-    return model, tuple(held)
+def _roles_now(robot: Robot, q: Array, given: Mapping[str, str | None]) -> dict[str, str | None]:
+    """The role that each limb is in: as given, else read off `q`."""
+    _check_roles(robot, {limb: role for limb, role in given.items() if role is not None}, "roles")
+    return {limb: given[limb] if limb in given else robot.role_of(limb, q) for limb in robot.roles}
+
+
+def _check_roles(robot: Robot, roles: Mapping[str, str], what: str) -> None:
+    for limb, role in roles.items():
+        if limb not in robot.roles:
+            raise unknown(f"{what}: limb", limb, robot.roles)
+        if role not in robot.roles[limb]:
+            raise unknown(f"{what}['{limb}']: role", role, robot.roles[limb])
+
+
+def _bound(path: Path, here: Any, what: str, takes: tuple[str, ...]) -> Path:
+    """The path with `AS_IS` replaced, if it is of a kind that its task takes."""
+    try:
+        bound = path.bind(here)
+    except SpecError as error:
+        raise SpecError(f"{what}: {error}") from None
+    # Paths of other people's classes say what they are by what they give.
+    check_kind(bound.kind or kind_of(checked(bound.at(0.0), what)), what, takes)
+    return bound
 
 
 def _driven(robot: Robot, phase: Phase, state: State, now: Mapping[str, str | None]) -> tuple[Driven, ...]:
     """Joints that are not the QP's: those held by roles, driven by name, or locked."""
     at = f"phase '{phase.name}'"
     paths: dict[str, Path] = {}
-    for limb, role in phase.roles.items():
-        if limb not in robot.roles:
-            raise unknown(f"{at}.roles: limb", limb, robot.roles)
-        if role not in robot.roles[limb]:
-            raise unknown(f"{at}.roles['{limb}']: role", role, robot.roles[limb])
+    _check_roles(robot, phase.roles, f"{at}.roles")
     for limb, held_by in robot.roles.items():
-        role = phase.roles.get(limb, now.get(limb))
+        role = phase.roles[limb] if limb in phase.roles else now[limb]
         if role is not None:
-            for joint, value in held_by[role].items():
-                here = state.joint(joint)
-                paths[joint] = Hold(here) if abs(here - value) < 1e-9 else MinJerk(here, value, phase.duration)
-        else:  # in no role: what every role holds is no joint of the QP's either
+            moved = {
+                joint: _towards(state.joint(joint), value, phase) for joint, value in held_by[role].items()
+            }
+            stuck = [joint for joint in phase.locked if joint in moved and not moved[joint].constant]
+            if stuck:
+                raise SpecError(f"{at}.locked: {', '.join(stuck)} moves as {limb} becomes '{role}'")
+            paths.update(moved)
+        elif held_by:  # in no role: what every role holds is no joint of the QP's either
             for joint in set.intersection(*(set(joints) for joints in held_by.values())):
                 paths[joint] = Hold(state.joint(joint))
     for joint in (*phase.driven, *phase.locked):
         if joint not in robot.joint_names:
             raise unknown(f"{at}: joint", joint, robot.joint_names)
-    paths.update({joint: path.bind(np.asarray(state.joint(joint))) for joint, path in phase.driven.items()})
+    for joint, path in phase.driven.items():
+        what, here = f"{at}.driven['{joint}']", state.joint(joint)
+        path = _bound(path, np.asarray(here), what, (NUMBER,))
+        first = float(path.at(0.0))
+        if path.constant:
+            path = _towards(here, first, phase)
+        elif abs(first - here) > 1e-6:
+            raise SpecError(f"{what}: starts at {first:.6g}, the joint is at {here:.6g}; start it at AS_IS")
+        paths[joint] = path
     paths.update({joint: Hold(state.joint(joint)) for joint in phase.locked})
+    if phase.joint_limits is not None:
+        for joint, path in paths.items():
+            _check_driven_range(robot, joint, path, phase)
     return tuple(Driven(robot.joint_index(joint)[1] - 6, path) for joint, path in sorted(paths.items()))
 
 
-def _check_feet(robot: Robot, phase: Phase, roles: Mapping[str, str | None], driven: tuple[Driven, ...]) -> None:
+def _towards(here: float, value: float, phase: Phase) -> Path:
+    """A joint's motion over the phase to where it is wanted, from rest to rest."""
+    return Hold(here) if abs(here - value) < 1e-9 else MinJerk(here, value, phase.duration)
+
+
+def _check_driven_range(robot: Robot, joint: str, path: Path, phase: Phase) -> None:
+    """A joint whose motion is given stays within its limits, or comes back to them."""
+    lower, upper = robot.joint_limits(joint)
+    values = np.array([float(path.at(t)) for t in np.linspace(0.0, phase.duration, 201)])
+    low, high = min(lower, values[0]), max(upper, values[0])
+    wrong = values[~((values >= low - 1e-9) & (values <= high + 1e-9))]
+    if len(wrong):
+        raise SpecError(
+            f"phase '{phase.name}': joint '{joint}' would be driven to {wrong[0]:.4g}, "
+            f"its limits are {lower:.4g} to {upper:.4g}"
+        )
+
+
+def _check_feet(
+    robot: Robot, phase: Phase, roles: Mapping[str, str | None], driven: tuple[Driven, ...]
+) -> None:
     """A foot may carry only while its limb is a leg, and not while the limb changes."""
     at = f"phase '{phase.name}'"
     moving = {robot.joint_names[d.joint] for d in driven if not d.path.constant}
     for contact in phase.contacts:
-        robot.frame_id(contact.frame)
+        frame_number(robot.model, contact.frame, f"{at}.contacts")
         for limb, foot in robot.feet.items():
             if foot != contact.frame or limb not in robot.roles:
                 continue
             if roles.get(limb) not in (None, "leg"):
-                raise SpecError(f"{at}: contact '{foot}' needs {limb} in role 'leg', it is in role '{roles[limb]}'")
+                raise SpecError(
+                    f"{at}: contact '{foot}' needs {limb} in role 'leg', it is in role '{roles[limb]}'"
+                )
             changing = moving & set(robot.limbs[limb])
             if changing:
-                raise SpecError(f"{at}: contact '{foot}' while {limb} changes its role ({', '.join(sorted(changing))} move)")
+                joints = ", ".join(sorted(changing))
+                raise SpecError(f"{at}: contact '{foot}' while {limb} changes its role ({joints} move)")
 
 
 def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget, ...]:
-    def number(name: str, who: str) -> int:
-        try:
-            return find_frame(model, name)
-        except SpecError as error:
-            raise SpecError(f"phase '{phase.name}', {who}: {error}") from None
-
+    """Contacts, then hard tasks, then soft ones."""
     targets = [
         FrameTarget(
-            f"contact({c.frame})", number(c.frame, "contacts"), WORLD,
-            Hold(state.pose(c.frame).translation), np.ones(3), np.zeros(3), np.inf, True,
+            f"contact({c.frame})",
+            find_frame(model, c.frame),
+            WORLD,
+            Hold(state.pose(c.frame).translation),
+            np.ones(3),
+            np.zeros(3),
+            np.inf,
+            True,
         )
         for c in phase.contacts
     ]
     for task in phase.frame_tasks:
-        frame = number(task.frame, task.label)
-        root = WORLD if task.root is None else number(task.root, task.label)
-        here = state.pose(task.frame) if task.root is None else state.pose(task.root).actInv(state.pose(task.frame))
-        if not (task.rotation_weight > 0).any() and not _wants_pose(task):
+        what = f"phase '{phase.name}', {task.label}"
+        frame = frame_number(model, task.frame, what)
+        root = WORLD if task.root is None else frame_number(model, task.root, what)
+        here = state.pose(task.frame)
+        if task.root is not None:
+            here = state.pose(task.root).actInv(here)
+        if POINT in task.takes and task.path.kind != POSE:
             here = here.translation
         targets.append(
             FrameTarget(
-                task.label, frame, root, task.path.bind(here), task.position_weight, task.rotation_weight,
-                task.gain, task in phase.hard,
+                task.label,
+                frame,
+                root,
+                _bound(task.path, here, f"{what}.target", task.takes),
+                task.position_weight,
+                task.rotation_weight,
+                task.gain,
+                task in phase.hard,
             )
         )
-    return tuple(sorted(targets, key=lambda target: not target.hard))
+    return tuple(targets)
 
 
-def _wants_pose(task: FrameTask) -> bool:
-    """Whether a position-only task was given poses, of which the origin counts."""
-    path = task.path
-    goal = getattr(path, "goal", None)
-    points = getattr(path, "points", ())
-    return any(isinstance(value, pin.SE3) for value in (goal, *points))
-
-
-def _joint_target(robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, at: str) -> JointTarget:
+def _joint_target(
+    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, at: str
+) -> JointTarget:
     """Target and weight of every joint that the task asks for and the phase leaves free."""
+    what = f"{at}, {task.label}"
     index = {name: j for j, name in enumerate(robot.joint_names)}
     values = task.target if isinstance(task.target, Mapping) else {}
-    weights = task.weight if isinstance(task.weight, Mapping) else {}
+    weights = task.weight if isinstance(task.weight, Mapping) else dict.fromkeys(index, task.weight)
     for name in (*values, *weights, *(task.joints or ())):
         if name not in index:
-            raise unknown(f"{at}, {task.label}: joint", name, robot.joint_names)
-    goal = task.target.q[7:] if isinstance(task.target, State) else q[7:]
+            raise unknown(f"{what}: joint", name, robot.joint_names)
+    goal = q[7:]
+    if isinstance(task.target, State):
+        own, other = robot.model, task.target.model
+        if list(own.names) != list(other.names):
+            raise SpecError(f"{what}.target: a state of '{other.name}', expected one of '{own.name}'")
+        goal = task.target.q[7:]
+    named = task.joints or tuple(values)
+    taken = [name for name in named if index[name] in given]
+    if hard and taken:
+        raise SpecError(f"{what}: {', '.join(taken)} is locked, driven or held by its limb's role")
     weight, paths = np.zeros(len(index)), []
-    for name in task.joints or (tuple(values) if values else robot.joint_names):
+    for name in named or robot.joint_names:
         j = index[name]
-        if j not in given:
-            weight[j] = weights.get(name, 0.0) if weights else task.weight
-            paths.append((j, values[name].bind(np.asarray(q[7 + j])) if name in values else Hold(goal[j])))
+        if j in given:
+            continue
+        weight[j] = weights.get(name, 0.0)
+        path = values.get(name, Hold(goal[j]))
+        paths.append((j, _bound(path, np.asarray(q[7 + j]), f"{what}.target['{name}']", (NUMBER,))))
     return JointTarget(task.label, tuple(paths), weight, task.gain, hard)

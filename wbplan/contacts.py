@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from wbplan.errors import SpecError
-from wbplan.paths import checked
+from wbplan.paths import POINT, checked, kind_of, name_of, number
 
 
 @final
@@ -29,10 +29,11 @@ class Contact:
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.friction) and self.friction > 0.0):
-            raise SpecError(f"Contact '{self.frame}'.friction: expected a positive number, got {self.friction}")
-        normal = checked(self.normal, f"Contact '{self.frame}'.normal")
-        if np.shape(normal) != (3,) or np.linalg.norm(normal) < 1e-9:
-            raise SpecError(f"Contact '{self.frame}'.normal: expected three numbers, not all zero, got {self.normal}")
+        at = f"Contact '{name_of(self.frame, 'Contact.frame')}'"
+        friction = number(self.friction, f"{at}.friction", "a finite positive number", above=0.0)
+        normal = checked(self.normal, f"{at}.normal")
+        if kind_of(normal) != POINT or np.linalg.norm(normal) < 1e-9:
+            raise SpecError(f"{at}.normal: expected three numbers, not all zero, got {self.normal}")
         unit = normal / np.linalg.norm(normal)
+        object.__setattr__(self, "friction", friction)
         object.__setattr__(self, "normal", tuple(float(x) for x in unit))

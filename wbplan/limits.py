@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
 from wbplan.errors import SpecError
+from wbplan.paths import number
 
 
 @final
@@ -26,8 +25,10 @@ class JointLimits:
     speed: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.speed <= 1.0:
-            raise SpecError(f"JointLimits.speed: expected a fraction in (0, 1], got {self.speed}")
+        speed = number(self.speed, "JointLimits.speed", "a fraction in (0, 1]", above=0.0)
+        if speed > 1.0:
+            raise SpecError(f"JointLimits.speed: expected a fraction in (0, 1], got {speed}")
+        object.__setattr__(self, "speed", speed)
 
 
 @final
@@ -47,7 +48,9 @@ class SupportPolygon:
     recovery_speed: float = 0.05
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.margin):
-            raise SpecError(f"SupportPolygon.margin: expected metres, got {self.margin}")
-        if not (np.isfinite(self.recovery_speed) and self.recovery_speed > 0.0):
-            raise SpecError(f"SupportPolygon.recovery_speed: expected a positive speed [m/s], got {self.recovery_speed}")
+        margin = number(self.margin, "SupportPolygon.margin", "a finite number of metres")
+        speed = number(
+            self.recovery_speed, "SupportPolygon.recovery_speed", "a finite positive speed [m/s]", above=0.0
+        )
+        object.__setattr__(self, "margin", margin)
+        object.__setattr__(self, "recovery_speed", speed)

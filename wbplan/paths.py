@@ -90,7 +90,7 @@ def kind_of(value: Value) -> str | None:
 def number(
     value: object, what: str, expected: str, *, least: float = -np.inf, above: float = -np.inf
 ) -> float:
-    """A finite number of at least `least` and above `above`, refused with a `SpecError` if it is not."""
+    """A finite number, `least` or more and more than `above`; refused with a `SpecError` if it is not."""
     try:  # not float(value) at once: that takes "1.0" as well
         scalar = np.array(value)
     except ValueError:  # lists of different lengths

@@ -15,6 +15,7 @@ from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
 from wbplan.errors import SolveError, SpecError
+from wbplan.paths import number
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
 from wbplan.script import Phase, Script
@@ -23,6 +24,9 @@ from wbplan.tick import Loop
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
+
+#: A loop that is open by more than this [m or rad] when its phase starts would not stay as it is.
+CLOSED = 5e-5
 
 
 @final
@@ -40,7 +44,7 @@ class Plan:
 
     @property
     def report(self) -> Mapping[str, Any]:
-        """Planning and motion time [s], ticks, their median and 99th percentile [us], worst errors, warnings."""
+        """Seconds of planning and motion, ticks, their median and p99 [us], worst errors, warnings."""
         report: Mapping[str, Any] = self.bundle.plan["report"]
         return report
 
@@ -65,7 +69,7 @@ class Plan:
         return self.bundle.write(
             Path(folder),
             extras={
-                "scene.html": lambda path: write_html(self.bundle, path),
+                "scene.html": lambda path: write_html(self.bundle, path, package_dirs=self._folders),
                 "plots.png": lambda path: plots.save(self.bundle, path),
             },
         )
@@ -74,7 +78,12 @@ class Plan:
         """Serve the animation in Meshcat; returns the server, with `.url` and `.stop()`."""
         from wbplan.view import serve
 
-        return serve(self.bundle, host=host, port=port)
+        return serve(self.bundle, host=host, port=port, package_dirs=self._folders)
+
+    @property
+    def _folders(self) -> tuple[Path, ...]:
+        """Where the robot's meshes are: relative names count from the URDF's own folder."""
+        return (self.robot.urdf_path.parent, *self.robot.package_dirs)
 
 
 def plan(
@@ -103,37 +112,41 @@ def plan(
         observe: called with the loop and the time [s] at every sample, as a live view wants.
 
     Raises:
-        SpecError: the script does not fit the robot, or a phase promises what its start does not hold.
+        SpecError: the script does not fit the robot, the start is outside the joint limits, or a phase
+            promises what its start does not hold.
         SolveError: a tick has no step that keeps every hard promise.
     """
     script = script if isinstance(script, Script) else Script(script)
-    state = start if isinstance(start, State) else robot.state(start)
+    dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
+    # The state may be another robot's: then its q has another size.
+    q, roles = np.array(robot.state(start.q if isinstance(start, State) else start).q), None
+    _inside_limits(robot, q)
     started = time.perf_counter()
     recorder = Recorder(robot, script, dt)
     placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
-    q, roles = np.array(state.q), None
-    _inside_limits(robot, q)
-    elapsed = 0.0
-    for index, phase in enumerate(script.phases):
+    lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
+    done = 0  # ticks
+    for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
         loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles)
         _promises_hold(loop, phase)
-        recorder.begin(index, loop, placed, elapsed)
-        ticks = max(1, int(np.ceil(phase.duration / dt - 1e-9)))
+        recorder.begin(index, loop, placed, done * dt)
         for k in range(ticks):
             if observe is not None:
-                observe(loop, elapsed + k * dt)
+                observe(loop, (done + k) * dt)
+            if progress is not None and k % 20 == 0:
+                progress((done + k) / sum(lengths), phase.name)
             try:
                 tick = loop.step()
             except SolveError as error:
-                where = f"at {elapsed + k * dt:.2f} s of the plan, {k * dt:.2f} s into"
+                where = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into"
                 raise SolveError(f"{where} {error}", error.clashes, error.limits) from None
             recorder.record(loop, tick)
-            if progress is not None and k % 20 == 0:
-                progress((elapsed + k * dt) / script.duration, phase.name)
-        elapsed += ticks * dt
+        done += ticks
         q, roles = loop.q, loop.compiled.roles
         placed.update(_where_held(loop.compiled, q))
-        recorder.end(index, loop, elapsed)
+        recorder.end(index, loop, done * dt)
+    if observe is not None:
+        observe(loop, done * dt)
     if progress is not None:
         progress(1.0, "done")
     bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
@@ -153,19 +166,27 @@ def _inside_limits(robot: Robot, q: Array) -> None:
 
 
 def _promises_hold(loop: Loop, phase: Phase) -> None:
-    """A phase's margin holds from its first sample on."""
-    if phase.margin is not None and loop.margin < phase.margin:
+    """A phase's margin holds from its first sample on, and its loops are closed."""
+    if phase.margin is not None and loop.margin < phase.margin - 1e-9:
         com = loop.stack.kinematics.com
         raise SpecError(
             f"phase '{phase.name}' promises a stability margin of {phase.margin:.4f} m but starts with "
-            f"{loop.margin:.4f} m (CoM x={com[0]:.4f}, y={com[1]:.4f} m over {len(phase.contacts)} contacts); "
-            f"move the CoM inside before it, or promise less"
+            f"{loop.margin:.4f} m (CoM x={com[0]:.4f}, y={com[1]:.4f} m over {len(phase.contacts)} "
+            f"contacts); move the CoM inside before it, or promise less"
         )
+    errors = loop.stack.errors()
+    for task in phase.loops:
+        gap, turn = errors[f"{task.label}.position"], errors[f"{task.label}.orientation"]
+        if gap > CLOSED or turn > CLOSED:
+            raise SpecError(
+                f"phase '{phase.name}': the loop '{task.label}' starts open by {gap:.4g} m and {turn:.4g} "
+                "rad; close it with a path before, or give it target=wb.AS_IS"
+            )
 
 
 def _where_held(compiled: CompiledPhase, q: Array) -> dict[str, Any]:
     """World poses of the carried bodies at `q`."""
-    state = State(compiled.model, q) if compiled.held else None
-    return {h.body.name: state.pose(h.body.name) for h in compiled.held} if state is not None else {}
-
-
+    if not compiled.held:
+        return {}
+    state = State(compiled.model, q)
+    return {h.body.name: state.pose(h.body.name) for h in compiled.held}

@@ -168,26 +168,21 @@ def _top_view(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
 
 
 def _feet(axes: Axes, named: list[tuple[str, Array]]) -> None:
-    """Footholds as dots, each foot's first one with its name, pointing away from the middle."""
+    """Footholds as dots, each foot's first one with its name on the side away from the middle."""
     if not named:
         return
     spots = np.array([spot[:2] for _, spot in named])
     axes.plot(*spots.T, ".", color=INK, markersize=5, zorder=3)
     middle = spots.mean(axis=0)
-    seen: set[str] = set()
-    for name, spot in named:
-        if name in seen:
-            continue
-        seen.add(name)
-        away = spot[:2] - middle
-        away = away / max(float(np.linalg.norm(away)), 1e-9)
+    for name, spot in dict(reversed(named)).items():  # of each foot the first
+        up = spot[1] >= middle[1] - 1e-3
         axes.annotate(
             name.removesuffix("_foot"),
-            (float(spot[0]), float(spot[1])),
-            xytext=(9.0 * float(away[0]), 9.0 * float(away[1])),
+            tuple(spot[:2].tolist()),
+            xytext=(0.0, 7.0 if up else -7.0),
             textcoords="offset points",
-            ha="center" if abs(away[0]) < 0.4 else ("left" if away[0] > 0 else "right"),
-            va="center" if abs(away[1]) < 0.4 else ("bottom" if away[1] > 0 else "top"),
+            ha="center",
+            va="bottom" if up else "top",
             fontsize=8,
             color=INK,
         )
@@ -222,25 +217,31 @@ def _margin(axes: Axes, bundle: Bundle) -> None:
 
 
 def _errors(axes: Axes, bundle: Bundle, parts: tuple[str, ...], unit: str) -> None:
-    motion = bundle.trajectory
-    found = {key: values for key, values in motion.errors.items() if key.rpartition(".")[2] in parts}
-    worst = {key: float(np.nanmax(values)) for key, values in found.items() if np.isfinite(values).any()}
-    order = sorted(worst, key=lambda key: -worst[key])
-    tasks = list(dict.fromkeys(key.rpartition(".")[0] for key in motion.errors))
-    for i, key in enumerate(order):
-        values = np.maximum(found[key], FLOOR)
-        if i < MOST_LINES:
-            name, _, part = key.rpartition(".")
-            label = name if part == parts[0] else f"{name} ({part})"
-            style = "-" if part == parts[0] else "--"
-            axes.plot(
-                motion.time, values, style, color=f"C{tasks.index(name) % 10}", linewidth=1.3, label=label
-            )
+    """Errors whose last name is one of `parts`; a colour means the same task in every panel."""
+    time, colors, contacts = bundle.trajectory.time, _colors(bundle), []
+    rest = 0
+    for key, values in bundle.trajectory.errors.items():
+        name, _, part = key.rpartition(".")
+        if part not in parts or not np.isfinite(values).any():
+            continue
+        drawn = np.maximum(values, FLOOR)
+        if name.startswith("contact("):
+            contacts.append(values)
+        elif name in colors:
+            label, style = (name, "-") if part == parts[0] else (f"{name}, {part}", "--")
+            axes.plot(time, drawn, style, color=colors[name], linewidth=1.3, label=label)
         else:
-            rest = f"{len(order) - i} with smaller errors" if i == MOST_LINES else None
-            axes.plot(motion.time, values, color="#c3cbd2", linewidth=0.8, zorder=1, label=rest)
+            rest += 1
+            axes.plot(time, drawn, color="#c3cbd2", linewidth=0.8, zorder=1)
+    if contacts:
+        worst = np.fmax.reduce(contacts)
+        axes.plot(
+            time, np.maximum(worst, FLOOR), color=FAINT, linewidth=0.9, zorder=1.5, label="worst contact"
+        )
+    if rest:
+        axes.plot([], [], color="#c3cbd2", linewidth=0.8, label=f"{rest} with smaller errors")
     axes.set_yscale("log")
-    if not order:
+    if not axes.lines:
         axes.set_ylim(FLOOR, 1.0)
         axes.text(0.5, 0.5, "no such task", transform=axes.transAxes, ha="center", va="center", color=FAINT)
     axes.set_ylabel(f"error [{unit}]")
@@ -250,6 +251,17 @@ def _errors(axes: Axes, bundle: Bundle, parts: tuple[str, ...], unit: str) -> No
     axes.tick_params(labelbottom=False)
     _legend(axes)
     _bands(axes, bundle)
+
+
+def _colors(bundle: Bundle) -> dict[str, str]:
+    """Colours of the tasks with the largest errors, contacts apart."""
+    worst: dict[str, float] = {}
+    for key, values in bundle.trajectory.errors.items():
+        name = key.rpartition(".")[0]
+        if not name.startswith("contact(") and np.isfinite(values).any():
+            worst[name] = max(worst.get(name, 0.0), float(np.nanmax(values)))
+    order = sorted(worst, key=lambda name: -worst[name])
+    return {name: f"C{i}" for i, name in enumerate(order[:MOST_LINES])}
 
 
 # ------------------------------------------------------------------------------------------- joints and base
@@ -345,33 +357,41 @@ def _bands(axes: Axes, bundle: Bundle) -> None:
 
 
 def _phase_names(axes: Axes, bundle: Bundle) -> float:
-    """Write the phases' names above the axes, slanted if they touch; returns their height [points]."""
+    """Write the phases' names above the axes, slanted if they would touch; returns their height [points]."""
     start, end = bundle.trajectory.time[[0, -1]]
-    names = [_short(phase["name"], 26) for phase in bundle.phases]
+    names = [_short(phase["name"], 24) for phase in bundle.phases]
     middles = [(phase["start"] + phase["end"]) / 2 for phase in bundle.phases]
-    wide = 0.0095 * (end - start)  # about one letter
-    slanted = any(
-        b - a < wide * (len(m) + len(n) + 3) / 2
-        for (a, m), (b, n) in pairwise(zip(middles, names, strict=True))
-    )
-    last = -np.inf
-    for middle, name in zip(middles, names, strict=True):
-        if slanted and middle - last < 2.0 * wide:
-            continue  # too narrow for a name
-        last = middle
-        axes.text(
-            middle,
-            1.02,
-            name,
-            transform=axes.get_xaxis_transform(),
-            rotation=40 if slanted else 0,
-            ha="left" if slanted else "center",
-            va="bottom",
-            rotation_mode="anchor",
-            fontsize=7.5,
-            color=INK,
-        )
-    return 16.0 + 2.9 * max(len(name) for name in names) if slanted else 18.0
+    letter, line = 0.0095 * (end - start), 0.027 * (end - start)
+    pairs = zip(pairwise(middles), pairwise(names), strict=True)
+    if all(b - a > letter * (len(m) + len(n) + 3) / 2 for (a, b), (m, n) in pairs):
+        for middle, name in zip(middles, names, strict=True):
+            _above(axes, middle, middle, name, 0.0)
+        return 18.0
+    # Side by side with the same slant; where phases are short, beside their middle, a line leading there.
+    places: list[float] = []
+    for middle in middles:
+        places.append(max(middle, places[-1] + line) if places else middle)
+    for i in reversed(range(len(places))):
+        places[i] = min(places[i], end - line * (len(places) - 1 - i))
+    for middle, place, name in zip(middles, places, names, strict=True):
+        if place >= start:  # else there are more phases than names have room
+            _above(axes, middle, place, name, 55.0)
+    return 24.0 + 3.5 * max(len(name) for name in names)
+
+
+def _above(axes: Axes, middle: float, place: float, name: str, slant: float) -> None:
+    """A phase's name above the axes at `place`, meaning the phase around `middle`."""
+    lead = 1.07 if slant else 1.02
+    across = axes.get_xaxis_transform()
+    if slant:
+        axes.plot([middle, place], [1.0, lead], transform=across, color=FAINT, linewidth=0.6, clip_on=False)
+    style: dict[str, Any] = {
+        "ha": "left" if slant else "center",
+        "va": "bottom",
+        "fontsize": 7.5,
+        "color": INK,
+    }
+    axes.text(place, lead, name, transform=across, rotation=slant, rotation_mode="anchor", **style)
 
 
 def _short(name: str, most: int) -> str:

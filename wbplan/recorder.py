@@ -24,7 +24,7 @@ NO_MARGIN = -1e9
 
 @final
 class Recorder:
-    """Collects samples; the sample at an edge belongs to the phase that starts there, the last to the last."""
+    """Collects samples; one at an edge belongs to the phase that starts there, the last to the last phase."""
 
     def __init__(self, robot: Robot, script: Script, dt: float) -> None:
         self._robot, self._script, self._dt = robot, script, dt
@@ -46,9 +46,17 @@ class Recorder:
         """A phase starts: what was the last sample of the one before becomes the first of this one."""
         self._placed = {name: pin.SE3ToXYZQUAT(pose) for name, pose in placed.items()}
         self._start = elapsed
-        for samples in (self._q, self._com, self._margin, self._phase, self._errors, self._targets, self._bodies):
+        for samples in (
+            self._q,
+            self._com,
+            self._margin,
+            self._phase,
+            self._errors,
+            self._targets,
+            self._bodies,
+        ):
             if samples:
-                samples.pop()  # type: ignore[attr-defined]
+                samples.pop()
         self._sample(index, loop)
         self._index = index
 
@@ -78,7 +86,9 @@ class Recorder:
         tasks = []
         for task in (*phase.hard, *phase.soft):
             worst = {
-                part: max((e[f"{task.label}.{part}"] for e in errors if f"{task.label}.{part}" in e), default=None)
+                part: max(
+                    (e[f"{task.label}.{part}"] for e in errors if f"{task.label}.{part}" in e), default=None
+                )
                 for part in ("position", "orientation", "joints")
             }
             tasks.append({"name": task.label, "hard": task in phase.hard, **worst})
@@ -88,7 +98,8 @@ class Recorder:
                 "start": self._start,
                 "end": elapsed,
                 "contacts": [
-                    {"frame": c.frame, "friction": c.friction, "normal": list(c.normal)} for c in phase.contacts
+                    {"frame": c.frame, "friction": c.friction, "normal": list(c.normal)}
+                    for c in phase.contacts
                 ],
                 "margin": NO_MARGIN if phase.margin is None else phase.margin,
                 "closures": [{"frame_a": a, "frame_b": b} for a, b in phase.closures],
@@ -112,7 +123,7 @@ class Recorder:
         n = len(self._q)
         margin = np.array(self._margin)
         trajectory = Trajectory(
-            time=np.arange(n) * self._dt,
+            time=np.arange(n, dtype=np.float64) * self._dt,
             q=np.array(self._q),
             v=np.array([*self._v, np.zeros(self._robot.model.nv)]),
             phase=np.array(self._phase, dtype=np.int64),
@@ -179,5 +190,3 @@ def _held(loop: Loop) -> dict[str, Array]:
         return {}
     oMf = loop.stack.kinematics.data.oMf
     return {h.body.name: pin.SE3ToXYZQUAT(oMf[h.frame]) for h in compiled.held}
-
-

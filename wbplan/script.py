@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any, final
-
-import numpy as np
 
 from wbplan.bodies import Body, Carried
 from wbplan.contacts import Contact
 from wbplan.errors import SpecError, listing
 from wbplan.limits import JointLimits, SupportPolygon
-from wbplan.paths import AsIs, Path, as_path
-from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task
+from wbplan.paths import NUMBER, Path, as_path, name_of, number
+from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 
 Limit = JointLimits | SupportPolygon
 
@@ -28,6 +27,24 @@ def _tuple_of(items: Iterable[Any], kinds: type | tuple[type, ...], what: str) -
         if not isinstance(item, kinds):
             raise SpecError(f"{what}: expected {names}, got {item!r}")
     return result
+
+
+def _mapping(given: Any, what: str, convert: Callable[[Any, str], Any]) -> Mapping[str, Any]:
+    """A read-only copy: name -> value, checked."""
+    if not isinstance(given, Mapping):
+        raise SpecError(f"{what}: expected a mapping by name, got {given!r}")
+    names = [name_of(name, f"{what}: key") for name in given]
+    return MappingProxyType({name: convert(given[name], f"{what}['{name}']") for name in names})
+
+
+def _driving(value: Any, what: str) -> Path:
+    """The given motion of a joint."""
+    path = as_path(value, what)
+    if path.live:
+        raise SpecError(f"{what}: a Live value may jump; give a PostureTask the Live target instead")
+    if path.kind is not None:
+        check_kind(path.kind, what, (NUMBER,))
+    return path
 
 
 def _unique(names: Sequence[str], what: str) -> None:
@@ -51,7 +68,8 @@ class Phase:
         duration: [s].
         roles: limb -> role, as the SRDF names them: the joints that the role holds are moved to its values
             over the phase and are not the QP's; unnamed limbs keep the role they are in.
-        driven: joint -> value or path whose motion is given; such joints are not the QP's.
+        driven: joint -> path of its motion, from where it is when the phase begins; or a value, which it
+            moves to over the phase. Such joints are not the QP's.
         locked: joints that stay as they are; not the QP's.
 
     Raises:
@@ -70,23 +88,25 @@ class Phase:
     locked: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise SpecError(f"Phase.name: expected a name, got {self.name!r}")
-        put = lambda key, value: object.__setattr__(self, key, value)  # noqa: E731
-        at = f"phase '{self.name}'"
+        at = f"phase '{name_of(self.name, 'Phase.name')}'"
+        put = partial(object.__setattr__, self)
         put("contacts", _tuple_of(self.contacts, Contact, f"{at}.contacts"))
         put("carried", _tuple_of(self.carried, Carried, f"{at}.carried"))
         put("hard", _tuple_of(self.hard, Task, f"{at}.hard"))
         put("soft", _tuple_of(self.soft, Task, f"{at}.soft"))
         put("limits", _tuple_of(self.limits, (JointLimits, SupportPolygon), f"{at}.limits"))
         put("locked", _tuple_of(self.locked, str, f"{at}.locked"))
-        put("roles", MappingProxyType(dict(self.roles)))
-        put("driven", MappingProxyType({j: as_path(p, f"{at}.driven['{j}']") for j, p in self.driven.items()}))
-        if not (np.isfinite(self.duration) and self.duration > 0.0):
-            raise SpecError(f"{at}.duration: expected a positive number of seconds, got {self.duration}")
+        put("roles", _mapping(self.roles, f"{at}.roles", name_of))
+        put("driven", _mapping(self.driven, f"{at}.driven", _driving))
+        seconds = number(self.duration, f"{at}.duration", "a finite positive time in seconds", above=0.0)
+        put("duration", seconds)
         _unique([c.frame for c in self.contacts], f"{at}.contacts")
         _unique([c.body.name for c in self.carried], f"{at}.carried")
-        _unique([t.label for t in (*self.hard, *self.soft)], f"{at}: tasks (give name=...)")
+        rows = [t.label for t in (*self.hard, *self.soft)] + [f"contact({c.frame})" for c in self.contacts]
+        _unique(rows, f"{at}: tasks (give name=...)")
+        both = sorted(set(self.driven) & set(self.locked))
+        if both:
+            raise SpecError(f"{at}: joints both driven and locked: {', '.join(both)}")
         for kind in (JointLimits, SupportPolygon):
             if sum(isinstance(limit, kind) for limit in self.limits) > 1:
                 raise SpecError(f"{at}.limits: more than one {kind.__name__}")
@@ -110,16 +130,23 @@ class Phase:
         return next((limit for limit in self.limits if isinstance(limit, JointLimits)), None)
 
     @property
-    def closures(self) -> tuple[tuple[str, str], ...]:
-        """Pairs (root, frame) whose relative pose is held, hard, at one value in all six axes."""
+    def loops(self) -> tuple[RelativePoseTask, ...]:
+        """Hard tasks that hold the relative pose of two frames at one value in all six axes."""
         return tuple(
-            (t.root, t.frame)
+            t
             for t in self.hard
             if isinstance(t, RelativePoseTask)
             and t.path.constant
             and (t.position_weight > 0).all()
             and (t.rotation_weight > 0).all()
         )
+
+    @property
+    def closures(self) -> tuple[tuple[str, str], ...]:
+        """The pairs (root, frame) of `loops`; a carried body stands for the frame that holds it."""
+        holder = {c.body.name: c.by for c in self.carried}
+        pairs = [(holder.get(t.root, t.root), holder.get(t.frame, t.frame)) for t in self.loops]
+        return tuple((root, frame) for root, frame in pairs if root != frame)
 
     @property
     def frame_tasks(self) -> tuple[FrameTask, ...]:
@@ -149,7 +176,7 @@ class Script:
         _unique([p.name for p in flat], "Script: phases")
         known: dict[str, Body] = {}
         for body in [*_tuple_of(bodies, Body, "Script.bodies"), *(c.body for p in flat for c in p.carried)]:
-            if known.setdefault(body.name, body) != body:
+            if not known.setdefault(body.name, body).same_as(body):
                 raise SpecError(f"Script: two different bodies are named '{body.name}'")
         object.__setattr__(self, "phases", tuple(flat))
         object.__setattr__(self, "bodies", tuple(known.values()))
@@ -163,8 +190,3 @@ class Script:
 def unknown(kind: str, name: str, valid: Iterable[str]) -> SpecError:
     """The error for a name that does not exist."""
     return SpecError(f"{kind} '{name}' does not exist; there are: {listing(list(valid))}")
-
-
-def is_as_is(path: Path) -> bool:
-    """Whether a path is the value at the start of its phase."""
-    return path.constant and isinstance(path.at(0.0), AsIs)

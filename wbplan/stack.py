@@ -19,10 +19,11 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, ComTarget, CompiledPhase, JointTarget
-from wbplan.geometry import HalfPlanes
+from wbplan import kernels
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
-from wbplan.rows import FrameRows
+from wbplan.posture import Posture
+from wbplan.rows import Rows
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,9 @@ REGULARISATION = 1e-6
 
 #: The tick stays this far [m] inside the promised margin: its row is linear, the CoM's path is not.
 MARGIN_RESERVE = 1e-4
+
+#: Stands for no bound in the QP.
+UNBOUNDED = 1e20
 
 
 def reach(model: Any, frame: int) -> float:
@@ -43,178 +47,128 @@ def reach(model: Any, frame: int) -> float:
 
 
 @final
-class Posture:
-    """A soft posture task over the free joints.
-
-    Attributes:
-        stiffness: (nf - 6,) squared weights; pull: fraction of the error removed per tick.
-        goal: (nf - 6,) target now; step: how far it moved in the last `advance`.
-    """
-
-    def __init__(self, target: JointTarget, free: NDArray[np.intp], dt: float) -> None:
-        self.label = target.label
-        column = {int(c) - 6: k for k, c in enumerate(free[6:])}
-        self.stiffness = target.weight[free[6:] - 6] ** 2
-        self.pull = 1.0 - float(np.exp(-target.gain * dt))
-        self.goal, self.step = np.zeros(len(column)), np.zeros(len(column))
-        for j, path in target.paths:
-            self.goal[column[j]] = float(path.at(0.0))
-        self._moving = [(column[j], path) for j, path in target.paths if not path.constant]
-        self._q_index = 7 + free[6:] - 6
-
-    def next_goal(self, q: Array) -> Array:
-        """(nf - 6,) where the next step should lead: the target, short of the share of the error that stays."""
-        goal: Array = self.goal - (1.0 - self.pull) * (self.goal - self.step - q[self._q_index])
-        return goal
-
-    def aim(self, t: float) -> None:
-        """Put the target where it is at time `t` [s]."""
-        for k, path in self._moving:
-            self.goal[k], self.step[k] = float(path.at(t)), 0.0
-
-    def advance(self, t: float) -> None:
-        """Move the target on to time `t` [s]."""
-        for k, path in self._moving:
-            value = float(path.at(t))
-            self.step[k], self.goal[k] = value - self.goal[k], value
-
-
-@final
 class Stack:
     """Matrices of a compiled phase, filled in place.
 
-    `measure` gives errors and margin at the kinematics' current q; `assemble` everything else.
+    `aim` and `advance` move the targets, `measure` gives errors and margin at a configuration, `assemble`
+    everything else for the step from there.
 
     Attributes:
-        J: (n, nf) rows in the order: hard frames | soft frames | hard CoM and joints | soft CoM.
-        A, b; C, d; H, g; lower, upper: the QP (see the module), lower and upper over the free columns.
-        hard_error: (m,) error of the hard rows at the last `measure`.
+        A, b; C, d; H, g; lower, upper: the QP (see the module), over the free columns. A's rows are those of
+            `rows` that are hard, then hard joints.
+        hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
+        margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
+        damping: what stands on the whole diagonal of H, at the last `assemble`.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones; hard_joint_goal: their targets.
     """
 
     def __init__(self, phase: CompiledPhase, dt: float) -> None:
         self.phase, self.dt = phase, dt
-        self.rows = FrameRows(phase.model, phase.frame_targets)
+        self.rows = Rows(phase.model, phase.frame_targets, phase.com_targets)
         self.kinematics = Kinematics(phase.model, self.rows.frames)
-        self._free = phase.free
+        self.free = phase.free
         self.driven = np.array([6 + d.joint for d in phase.driven], dtype=np.intp)
-        self._driving = any(not d.path.constant for d in phase.driven)
-        self._mask = np.ascontiguousarray(self.rows.mask[:, phase.free])
-        self._driven_mask = self.rows.mask[:, self.driven]
-        self._coms = [(c, np.flatnonzero(c.weight > 0)) for c in phase.com_targets]
-        self._allocate()
+        self.driven_step = np.zeros(len(self.driven))
+        self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
+        self.drift, self.margin, self.damping = 0.0, np.inf, 0.0
+        self._hard_rows()
+        self._soft_rows()
         self._joint_box()
-        self._diagonal()
+        self._polygon()
 
-    def _allocate(self) -> None:
-        rows, nf = self.rows, len(self._free)
-        hard_com = sum(len(axes) for c, axes in self._coms if c.hard)
-        soft_com = sum(len(axes) for c, axes in self._coms if not c.hard)
+    def _hard_rows(self) -> None:
+        rows, nf = self.rows, len(self.free)
         self.hard_joints = [
-            (j, path, t.label) for t in self.phase.joint_targets if t.hard for j, path in t.paths if t.weight[j] > 0
+            (j, path, t.label)
+            for t in self.phase.joint_targets
+            if t.hard
+            for j, path in t.paths
+            if t.weight[j] > 0
         ]
         self.hard_joint_goal = np.array([float(path.at(0.0)) for _, path, _ in self.hard_joints])
-        self._hard_joint_step = np.zeros(len(self.hard_joints))
-        self.n_hard = rows.hard_rows + hard_com + len(self.hard_joints)
-        n_soft = len(rows.error) - rows.hard_rows + soft_com
+        self.n_hard = rows.hard + len(self.hard_joints)
         self.A, self.b = np.zeros((self.n_hard, nf)), np.zeros(self.n_hard)
-        self._soft, self._soft_rhs = np.zeros((n_soft, nf)), np.zeros(n_soft)
-        self._soft_error = np.zeros(n_soft)
-        weights, gains = [rows.weight[rows.hard_rows :]], [rows.gain[rows.hard_rows :]]
-        for c, axes in self._coms:
-            if not c.hard:
-                weights.append(c.weight[axes])
-                gains.append(np.full(len(axes), c.gain))
-        self._weight = np.concatenate(weights)
-        self._pull = 1.0 - np.exp(-np.concatenate(gains) * self.dt)
-        self._curvature = 0.5 * self._lever() * self._weight**2 * self._pull
-        self._weighted = np.zeros((n_soft, nf))
-        self._weight_column, self._minus_weight = self._weight[:, None], -self._weight
+        for i, (joint, _, _) in enumerate(self.hard_joints):
+            self.A[rows.hard + i, np.searchsorted(self.free, 6 + joint)] = 1.0
         self.hard_error = np.zeros(self.n_hard)
-        self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
-        edges = 0 if self.phase.polygon is None else len(self.phase.polygon.offsets)
-        self.C, self.d = np.zeros((edges, nf)), np.zeros(edges)
-        self._J = np.zeros((6, nf))
-        self._W = np.zeros((len(rows.error), nf))
-        self._H_diagonal = self.H.reshape(-1)[:: nf + 1]
-        self._com_goal = [np.array(c.path.at(0.0), dtype=float) for c, _ in self._coms]
-        self._com_step = [np.zeros(3) for _ in self._coms]
-        self.driven_step = np.zeros(len(self.driven))
+        self._hard_given = np.zeros(rows.hard)
+        self._hard_part = self._part(slice(0, rows.hard), self.A[: rows.hard], self._hard_given)
 
-    def _lever(self) -> Array:
+    def _soft_rows(self) -> None:
+        rows, nf = self.rows, len(self.free)
+        soft = slice(rows.hard, len(rows.error))
+        count = len(rows.error) - rows.hard
+        self._weight, self._soft_error, self._soft_motion = rows.weight[soft], rows.error[soft], rows.motion[soft]
+        self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
+        self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
+        self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
+        self._soft_part = self._part(soft, self._soft, self._soft_given)
+        targets = [t for t in self.phase.joint_targets if not t.hard]
+        self._posture_goal, self._posture_step = np.zeros((2, len(targets), nf - 6))
+        self.postures = [
+            Posture(t, self.free, self.dt, self._posture_goal[k], self._posture_step[k])
+            for k, t in enumerate(targets)
+        ]
+        self._stiffness = np.array([p.stiffness for p in self.postures]).reshape(-1, nf - 6)
+        self._posture_pull = np.array([p.pull for p in self.postures])
+        self._diagonal = np.full(nf, REGULARISATION + self.phase.damping)
+        self._diagonal[6:] += self._stiffness.sum(axis=0)
+        self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
+
+    def _part(self, span: slice, out: Array, given: Array) -> tuple[Any, ...]:
+        """Arguments of `kernels.rows` for a span of rows: all views, taken once."""
+        rows, kin = self.rows, self.kinematics
+        return (
+            kin.jacobian, kin.com_jacobian, rows.wrench[span], rows.mask[span], rows.chosen[span],
+            rows.frame_groups, self.free, self.driven, self.driven_step, out, given,
+        )  # fmt: skip
+
+    def _levers(self, soft: slice) -> Array:
         """Bound on the curvature of each soft row's error, per unit of error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
-        for target, (_, positions, _, rotations) in zip(self.rows.targets, self.rows.spans, strict=True):
-            if not target.hard:
-                arm = max(reach(model, target.frame), reach(model, target.root))
-                levers += [arm] * positions + [1.0] * rotations
         longest = max(reach(model, k) for k in range(len(model.frames)))
-        levers += [longest for com, axes in self._coms if not com.hard for _ in axes]
+        for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
+            group = row // 3
+            if not isinstance(target, FrameTarget):
+                levers.append(longest)
+            elif group < len(self.rows.position_targets):
+                levers.append(max(reach(model, target.frame), reach(model, target.root)))
+            else:
+                levers.append(1.0)
         return np.array(levers)
 
     def _joint_box(self) -> None:
         """Bounds of the free joints; the base (first six columns) has none."""
-        model, free = self.phase.model, self._free
-        limits, nf = self.phase.phase.joint_limits, len(free)
-        joints = free[6:] - 6
-        self._q_index = 7 + joints
+        model, limits, nf = self.phase.model, self.phase.phase.joint_limits, len(self.free)
+        self.q_index = self.free[6:] + 1
         self._q_lower, self._q_upper = np.full(nf - 6, -np.inf), np.full(nf - 6, np.inf)
         self._reach = np.full(nf - 6, np.inf)
-        self.lower, self.upper = np.full(nf, -1e20), np.full(nf, 1e20)
-        self._lower, self._upper = self.lower[6:], self.upper[6:]
+        self.lower, self.upper = np.full(nf, -UNBOUNDED), np.full(nf, UNBOUNDED)
         if limits is not None:
-            self._q_lower = np.array(model.lowerPositionLimit)[self._q_index]
-            self._q_upper = np.array(model.upperPositionLimit)[self._q_index]
-            self._reach = limits.speed * np.array(model.velocityLimit)[free[6:]] * self.dt
-        self._back = -self._reach
+            self._q_lower = np.array(model.lowerPositionLimit)[self.q_index]
+            self._q_upper = np.array(model.upperPositionLimit)[self.q_index]
+            self._reach = limits.speed * np.array(model.velocityLimit)[self.free[6:]] * self.dt
+        else:
+            self._reach[:], self._q_lower[:], self._q_upper[:] = UNBOUNDED, -UNBOUNDED, UNBOUNDED
 
-    def _diagonal(self) -> None:
-        """What never changes on the diagonal, and the posture tasks' share of it."""
-        self._base_diagonal = np.full(len(self._free), REGULARISATION + self.phase.damping)
-        self.postures = [Posture(t, self._free, self.dt) for t in self.phase.joint_targets if not t.hard]
-        for posture in self.postures:
-            self._base_diagonal[6:] += posture.stiffness
-
-    # -- each tick -----------------------------------------------------------------------------------
-
-    def measure(self, q: Array) -> None:
-        """Kinematics, errors and margin at `q` for the targets as they stand now."""
-        self.kinematics.update(q)
-        self.rows.measure(self.kinematics)
-        k, hard = 0, self.rows.hard_rows
-        self.hard_error[:hard] = self.rows.error[:hard]
-        self._soft_error[: len(self.rows.error) - hard] = self.rows.error[hard:]
-        at_hard, at_soft = hard, len(self.rows.error) - hard
-        for k, (com, axes) in enumerate(self._coms):
-            error = (self._com_goal[k] - self.kinematics.com)[axes]
-            if com.hard:
-                self.hard_error[at_hard : at_hard + len(axes)] = error
-                at_hard += len(axes)
-            else:
-                self._soft_error[at_soft : at_soft + len(axes)] = error
-                at_soft += len(axes)
-        for i, (joint, _, _) in enumerate(self.hard_joints):
-            self.hard_error[at_hard + i] = self.hard_joint_goal[i] - q[7 + joint]
-
-    @property
-    def margin(self) -> float:
-        """Stability margin [m] at the last `measure`; infinite where the phase has no polygon."""
+    def _polygon(self) -> None:
         polygon = self.phase.polygon
-        if polygon is None:
-            return np.inf
-        return float((polygon.offsets - polygon.normals @ self.kinematics.com[:2]).min())
+        self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
+        self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
+        self.C, self.d = np.zeros((len(self._offsets), len(self.free))), np.zeros(len(self._offsets))
+
+    # -- each tick ---------------------------------------------------------------------------------------
 
     @property
     def live(self) -> bool:
         """Whether a target may have been set since the last tick."""
-        return self.rows.live or any(c.path.live for c, _ in self._coms)
+        return self.rows.live
 
     def aim(self, t: float) -> None:
         """Put all targets where they are at time `t` [s]."""
-        self.rows.aim(t, every=True)
-        for k, (com, _) in enumerate(self._coms):
-            self._com_goal[k] = np.array(com.path.at(t), dtype=float)
+        self.rows.aim(t)
+        self.rows.motion[:] = 0.0
         for i, (_, path, _) in enumerate(self.hard_joints):
             self.hard_joint_goal[i] = float(path.at(t))
         for posture in self.postures:
@@ -223,104 +177,63 @@ class Stack:
     def advance(self, t: float) -> None:
         """Move all targets on to time `t` [s], keeping how far each goes, and so the driven joints."""
         self.rows.advance(t)
-        for k, (com, _) in enumerate(self._coms):
-            goal = np.array(com.path.at(t), dtype=float)
-            self._com_step[k] = goal - self._com_goal[k]
-            self._com_goal[k] = goal
-        for i, (_, path, _) in enumerate(self.hard_joints):
-            value = float(path.at(t))
-            self._hard_joint_step[i], self.hard_joint_goal[i] = value - self.hard_joint_goal[i], value
         for posture in self.postures:
             posture.advance(t)
-        if self._driving:
-            q = self.kinematics.q
-            for i, d in enumerate(self.phase.driven):
-                self.driven_step[i] = float(d.path.at(t)) - q[7 + d.joint]
+        q = self.kinematics.q
+        for k, driven in self._moving_driven:
+            self.driven_step[k] = float(driven.path.at(t)) - q[7 + driven.joint]
+        for i, (joint, path, _) in enumerate(self.hard_joints):
+            self.hard_joint_goal[i] = float(path.at(t))
+            self.hard_error[self.rows.hard + i] = self.hard_joint_goal[i] - q[7 + joint]
+
+    def measure(self, q: Array) -> None:
+        """Kinematics, errors and margin at `q` for the targets as they stand now."""
+        rows = self.rows
+        self.kinematics.update(q)
+        self.drift, self.margin = rows.measure(self.kinematics, self._normals, self._offsets)
+        self.hard_error[: rows.hard] = rows.error[: rows.hard]
+        for i, (joint, _, _) in enumerate(self.hard_joints):
+            error = self.hard_joint_goal[i] - q[7 + joint]
+            self.hard_error[rows.hard + i] = error
+            self.drift = max(self.drift, abs(error))
 
     def assemble(self) -> None:
         """Fill H, g, A, b, C, d, lower and upper for the step to the targets that `advance` set."""
-        kin, rows = self.kinematics, self.rows
+        rows, kin = self.rows, self.kinematics
         kin.differentiate()
         rows.write(kin)
-        kin.jacobian.take(self._free, axis=1, out=self._J)
-        hard, soft = rows.hard_rows, len(rows.error) - rows.hard_rows
-        np.matmul(rows.wrench, self._J, out=self._W)
-        np.multiply(self._W[:hard], self._mask[:hard], out=self.A[:hard])
-        np.multiply(self._W[hard:], self._mask[hard:], out=self._soft[:soft])
+        kernels.rows(*self._hard_part)
+        kernels.rows(*self._soft_part)
         self.b[:] = self.hard_error
-        self.b[:hard] += rows.motion[:hard]
+        self.b[: rows.hard] += rows.motion[: rows.hard] - self._hard_given
         np.multiply(self._pull, self._soft_error, out=self._soft_rhs)
-        self._soft_rhs[:soft] += rows.motion[hard:]
-        if self._driving:
-            given = ((rows.wrench @ kin.jacobian[:, self.driven]) * self._driven_mask) @ self.driven_step
-            self.b[:hard] -= given[:hard]
-            self._soft_rhs[:soft] -= given[hard:]
-        self._com_rows(hard, soft)
-        self._cost()
-        self._limits()
+        self._soft_rhs += self._soft_motion - self._soft_given
+        self.damping = self.phase.damping + REGULARISATION + kernels.cost(
+            self._soft, self._weight, self._soft_rhs, self._soft_error, self._curvature, self._diagonal,
+            self._stiffness, self._posture_pull, self._posture_goal, self._posture_step, kin.q[self.q_index],
+            self.H, self.g,
+        )  # fmt: skip
+        self.fill_box()
+        support = self.phase.phase.support
+        if support is not None:
+            self._fill_polygon(support.margin, -support.recovery_speed * self.dt)
 
-    def _com_rows(self, at_hard: int, at_soft: int) -> None:
-        if not self._coms and not self.hard_joints:
-            return
-        J = self.kinematics.com_jacobian
-        for k, (com, axes) in enumerate(self._coms):
-            step = self._com_step[k][axes]
-            if self._driving:
-                step = step - J[np.ix_(axes, self.driven)] @ self.driven_step
-            into, rhs, at = (self.A, self.b, at_hard) if com.hard else (self._soft, self._soft_rhs, at_soft)
-            into[at : at + len(axes)] = J[np.ix_(axes, self._free)]
-            rhs[at : at + len(axes)] += step
-            if com.hard:
-                at_hard += len(axes)
-            else:
-                at_soft += len(axes)
-        for i, (joint, _, _) in enumerate(self.hard_joints):
-            self.A[at_hard + i, np.searchsorted(self._free, 6 + joint)] = 1.0
-            self.b[at_hard + i] += self._hard_joint_step[i]
-
-    def _cost(self) -> None:
-        np.multiply(self._soft, self._weight_column, out=self._weighted)
-        np.matmul(self._weighted.T, self._weighted, out=self.H)
-        self._H_diagonal += self._base_diagonal + self._curvature_damping()
-        np.matmul(self._weighted.T, self._minus_weight * self._soft_rhs, out=self.g)
-        for posture in self.postures:
-            self.g[6:] -= posture.stiffness * (posture.next_goal(self.kinematics.q) - self.kinematics.q[self._q_index])
-
-    def _curvature_damping(self) -> float:
-        return float(np.abs(self._soft_error) @ self._curvature)
-
-    def diagonal_damping(self) -> float:
-        """What stands on the whole diagonal of H: regularisation, damping tasks and curvature damping."""
-        return REGULARISATION + self.phase.damping + self._curvature_damping()
-
-    def com_goal(self, target: ComTarget) -> tuple[Array, Array]:
-        """Where a CoM task's target is now [m], and how far it moved in the last `advance`."""
-        k = next(k for k, (com, _) in enumerate(self._coms) if com is target)
-        return self._com_goal[k], self._com_step[k]
+    def _fill_polygon(self, margin: float, least: float) -> None:
+        kin = self.kinematics
+        kernels.polygon(
+            self._normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
+            margin + MARGIN_RESERVE, least, self.C, self.d,
+        )  # fmt: skip
 
     def fill_box(self) -> None:
         """Fill lower and upper for the current configuration."""
-        q = self.kinematics.q[self._q_index]
-        for bound, into in ((self._q_lower, self._lower), (self._q_upper, self._upper)):
-            np.subtract(bound, q, out=into)
-            np.minimum(into, self._reach, out=into)
-            np.maximum(into, self._back, out=into)
+        kernels.box(
+            self.kinematics.q, self.q_index, self._q_lower, self._q_upper, self._reach, self.lower, self.upper
+        )
 
-    def _limits(self) -> None:
-        self.fill_box()
-        polygon, limit = self.phase.polygon, self.phase.phase.support
-        if polygon is None or limit is None:
-            return
-        J = self.kinematics.com_jacobian[:2]
-        np.matmul(polygon.normals, J.take(self._free, axis=1), out=self.C)
-        np.maximum(self._room(polygon, limit.margin), -limit.recovery_speed * self.dt, out=self.d)
-        if self._driving:
-            self.d -= polygon.normals @ (J[:, self.driven] @ self.driven_step)
-
-    def _room(self, polygon: HalfPlanes, margin: float) -> Array:
-        """(E,) how far [m] the CoM may still move towards each edge; negative where it has to come back."""
-        room: Array = polygon.offsets - polygon.normals @ self.kinematics.com[:2] - (margin + MARGIN_RESERVE)
-        return room
+    def soft_damping(self) -> float:
+        """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
+        return REGULARISATION + self.phase.damping + float(np.abs(self._soft_error) @ self._curvature)
 
     def linearise(self, *, recovering: bool) -> None:
         """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves.
@@ -328,32 +241,30 @@ class Stack:
         Args:
             recovering: the CoM comes from outside the margin, so the correction need not bring it inside.
         """
-        motion, steps, driving = self.rows.motion.copy(), self._com_step, self._driving
-        self.rows.motion[:], self._com_step, self._driving = 0.0, [np.zeros(3) for _ in steps], False
-        lower, upper = self.lower.copy(), self.upper.copy()
-        self.assemble()
-        self.rows.motion[:], self._com_step, self._driving = motion, steps, driving
-        self.lower[:], self.upper[:] = lower, upper
-        polygon, limit = self.phase.polygon, self.phase.phase.support
-        if polygon is not None and limit is not None:
-            room = self._room(polygon, limit.margin)
-            self.d[:] = np.maximum(room, 0.0) if recovering else room
+        rows, kin = self.rows, self.kinematics
+        given = self.driven_step.copy()
+        self.driven_step[:] = 0.0
+        kin.differentiate()
+        rows.write(kin)
+        kernels.rows(*self._hard_part)
+        self.b[:] = self.hard_error
+        support = self.phase.phase.support
+        if support is not None:
+            self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
+        self.driven_step[:] = given
 
     def reach(self, column: int) -> float:
         """How far [m or rad] the speed limit lets a free column move in one tick."""
         return float(self._reach[column - 6])
 
-    # -- names -----------------------------------------------------------------------------------------
+    # -- names -------------------------------------------------------------------------------------------
 
     def hard_names(self) -> list[tuple[str, str]]:
         """(label, unit) of every hard row."""
         names: list[tuple[str, str]] = []
-        for target, (_, n, _, m) in zip(self.rows.targets, self.rows.spans, strict=True):
-            if target.hard:
-                names += [(target.label, "m")] * n + [(target.label, "rad")] * m
-        for com, axes in self._coms:
-            if com.hard:
-                names += [(com.label, "m")] * len(axes)
+        for label, part, span in self.rows.labels:
+            if span.stop <= self.rows.hard:
+                names += [(label, "m" if part == "position" else "rad")] * (span.stop - span.start)
         return names + [(label, "rad") for _, _, label in self.hard_joints]
 
     def edge_names(self) -> list[str]:
@@ -367,24 +278,22 @@ class Stack:
         """(lower, upper) bound's name of every free column."""
         names: list[tuple[str, str]] = [("base", "base")] * 6
         joints = self.phase.robot.joint_names
-        return names + [(f"{joints[c - 6]} lower", f"{joints[c - 6]} upper") for c in self._free[6:]]
+        return names + [(f"{joints[c - 6]} lower", f"{joints[c - 6]} upper") for c in self.free[6:]]
 
     def errors(self) -> dict[str, float]:
-        """Norm of every task's error at the last `measure`: '<label>.position' [m], '.orientation' [rad]."""
-        found: dict[str, float] = {}
-        for target, (i, n, j, m) in zip(self.rows.targets, self.rows.spans, strict=True):
-            if n:
-                found[f"{target.label}.position"] = float(np.linalg.norm(self.rows.error[i : i + n]))
-            if m:
-                found[f"{target.label}.orientation"] = float(np.linalg.norm(self.rows.error[j : j + m]))
-        for k, (com, axes) in enumerate(self._coms):
-            error = (self._com_goal[k] - self.kinematics.com)[axes]
-            found[f"{com.label}.position"] = float(np.linalg.norm(error))
-        q = self.kinematics.q
+        """Norm of every task's error at the last `measure`.
+
+        Keys: '<label>.position' [m], '<label>.orientation' [rad], '<label>.joints' [rad].
+        """
+        error, joints = self.rows.error, self.kinematics.q[self.q_index]
+        found = {f"{label}.{part}": _norm(error[span]) for label, part, span in self.rows.labels}
         for posture in self.postures:
-            gap = (posture.goal - q[self._q_index])[posture.stiffness > 0]
-            found[f"{posture.label}.joints"] = float(np.linalg.norm(gap))
-        for i, (joint, _, label) in enumerate(self.hard_joints):
-            found[f"{label}.joints"] = float(np.hypot(found.get(f"{label}.joints", 0.0), self.hard_joint_goal[i] - q[7 + joint]))
+            found[f"{posture.label}.joints"] = _norm((posture.goal - joints)[posture.stiffness > 0])
+        for i, (_, _, label) in enumerate(self.hard_joints):
+            key, gap = f"{label}.joints", float(self.hard_error[self.rows.hard + i])
+            found[key] = float(np.hypot(found.get(key, 0.0), gap))
         return found
 
+
+def _norm(vector: Array) -> float:
+    return float(np.sqrt(vector @ vector))

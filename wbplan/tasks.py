@@ -61,7 +61,7 @@ def _pose_weights(value: Any, what: str) -> tuple[Array, Array]:
 def check_kind(kind: str | None, what: str, takes: tuple[str, ...]) -> None:
     """Refuse a target that is not of a kind that its task takes."""
     if kind not in takes:
-        raise SpecError(f"{what}: expected {' or '.join(takes)}, got {kind}")
+        raise SpecError(f"{what}: expected {' or '.join(takes)}, got {kind or 'AS_IS'}")
 
 
 def _target(target: Any, what: str, takes: tuple[str, ...]) -> Path:
@@ -360,9 +360,9 @@ class PostureTask(Task):
         if self.joints is None:
             return
         given: Any = self.joints
-        if isinstance(given, str) or not isinstance(given, Iterable):
-            raise SpecError(f"{at}joints: expected a list of joints, got {given!r}")
-        put("joints", tuple(_by_joint(dict.fromkeys(given), f"{at}joints", lambda _, __: None)))
+        if isinstance(given, str) or not isinstance(given, Iterable) or not (joints := tuple(given)):
+            raise SpecError(f"{at}joints: expected a list of one joint or more, got {given!r}")
+        put("joints", tuple(name_of(joint, f"{at}joints") for joint in joints))
         left = [j for j in self.target if j not in self.joints] if isinstance(self.target, Mapping) else []
         if left:
             raise SpecError(f"{at}target: {listing(left)} not among its joints: {listing(self.joints)}")

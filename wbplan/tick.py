@@ -232,9 +232,7 @@ class Loop:
         )
 
     def _kept(self, before: float) -> bool:
-        stack = self.stack
-        drift = float(np.abs(stack.hard_error).max(initial=0.0))
-        return drift <= DRIFT and self._margin_kept(before)
+        return self.stack.drift <= DRIFT and self._margin_kept(before)
 
     def _margin_kept(self, before: float) -> bool:
         """Inside the promise, or, coming from outside of it, no further out than before."""

@@ -112,6 +112,32 @@ def test_only_the_largest_errors_have_a_line_of_their_own(machine: ModuleType, g
     assert "task3" not in shown
 
 
+def test_contacts_are_one_line(machine: ModuleType, good: Bundle) -> None:
+    size = len(good.trajectory)
+    errors = {f"contact(leg{i}_foot).position": np.full(size, 1e-6 * i) for i in (1, 2, 3)}
+    errors["contact(leg3_foot).position"][:9] = np.nan
+    (worst,) = lines(plots.figure(machine.edited(good, errors=errors)), "worst contact")
+    np.testing.assert_allclose(worst[:, 1], [2e-6] * 9 + [3e-6] * (size - 9))
+
+
+def test_many_phases_keep_their_names_apart(machine: ModuleType, good: Bundle) -> None:
+    time = good.trajectory.time
+    starts = np.arange(0, 70, 3)
+    names = [f"phase number {i}" for i in range(len(starts))]
+    ends = [*starts[1:], 70]
+    promises = [
+        {**good.phases[0], "name": name, "start": float(time[a]), "end": float(time[b])}
+        for name, a, b in zip(names, starts, ends, strict=True)
+    ]
+    drawing = plots.figure(machine.planned(good, phases=promises))
+    margin = next(axes for axes in drawing.axes if axes.get_ylabel() == "margin [m]")
+    placed = [text.get_position()[0] for text in margin.texts]
+    assert [text.get_text() for text in margin.texts] == names
+    assert np.diff(placed).min() > 0.02 * time[-1]
+    assert placed[0] >= 0.0
+    assert placed[-1] <= time[-1]
+
+
 def test_a_path_that_cannot_be_written_is_named(good: Bundle, tmp_path: Path) -> None:
     with pytest.raises(BundleError, match=r"nowhere.*plots\.png: cannot be written"):
         plots.save(good, tmp_path / "nowhere" / "plots.png")

@@ -263,7 +263,8 @@ def test_the_backends_agree_on_what_they_reach(legarm: wb.Robot) -> None:
     # Each corrects drift when it sees it, so their joints differ by what a tick may leave to the next.
     np.testing.assert_allclose(ends["proxqp"][0], ends["placo"][0], atol=1e-4)
     for name, error in ends["proxqp"][1].items():
-        assert ends["placo"][1][name] == pytest.approx(error, abs=1e-5), name
+        bound = 1e-4 if name.endswith("joints") else 1e-5
+        assert ends["placo"][1][name] == pytest.approx(error, abs=bound), name
 
 
 def test_an_unknown_backend_lists_those_that_exist(legarm: wb.Robot) -> None:

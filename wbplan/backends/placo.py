@@ -124,7 +124,7 @@ class PlacoBackend:
 
     def _com_tasks(self) -> None:
         self._coms = []
-        for target in self._stack.phase.com_targets:
+        for k, target in enumerate(self._stack.phase.com_targets):
             lag = 0.0 if target.hard else float(np.exp(-target.gain * self._stack.dt))
             for weight in sorted(set(target.weight[target.weight > 0])):
                 axes = "".join(axis for axis, w in zip("xyz", target.weight, strict=True) if w == weight)
@@ -132,7 +132,7 @@ class PlacoBackend:
                 if axes != "xyz":
                     task.mask.set_axises(axes, "task")
                 task.configure(f"{target.label} {axes}", *self._priority(target.label, target.hard, weight))
-                self._coms.append((task, target, lag))
+                self._coms.append((task, k, lag))
 
     def _posture_tasks(self) -> None:
         """One PlaCo task for each distinct weight among the joints; hard ones each by itself."""
@@ -162,8 +162,10 @@ class PlacoBackend:
         solver.enable_joint_limits(limits is not None)
         solver.enable_velocity_limits(limits is not None)
         if limits is not None:
-            for joint, speed in zip(phase.robot.joint_names, phase.model.velocityLimit[6:], strict=True):
-                robot.set_velocity_limit(joint, float(limits.speed * speed))
+            given = {driven.joint for driven in phase.driven}  # a given motion may use all of the URDF's speed
+            for j, name in enumerate(phase.robot.joint_names):
+                share = 1.0 + 1e-6 if j in given else limits.speed
+                robot.set_velocity_limit(name, float(share * phase.model.velocityLimit[6 + j]))
             self._widened: set[int] = set()
             self._admit_outsiders()
         self._polygon = None
@@ -246,16 +248,16 @@ class PlacoBackend:
         q = stack.kinematics.q
         for k, j, name, task in self._driven:
             task.set_joint(name, float(q[j] + stack.driven_step[k]))
-        for task, com, lag in self._coms:
-            goal, motion = stack.com_goal(com)
-            task.target_world = goal - lag * (goal - motion - stack.kinematics.com)
+        for task, k, lag in self._coms:
+            goal = rows.com_goal[k]
+            task.target_world = goal - lag * (goal - rows.com_motion[k] - stack.kinematics.com)
         for task, joints, posture in self._postures:
-            goals = posture.next_goal(q)
+            goals = posture.next_goal(q[stack.q_index])
             for k, name in joints:
                 task.set_joint(name, float(goals[k]))
         for (task, name), goal in zip(self._hard_joints, stack.hard_joint_goal, strict=True):
             task.set_joint(name, float(goal))
-        self._regularisation.set_weight(stack.diagonal_damping())
+        self._regularisation.set_weight(stack.soft_damping())
         if self._polygon is not None:
             self._polygon.margin = self._margin()
         if self._widened:

@@ -13,14 +13,13 @@ from pathlib import Path
 from rich.console import Console
 
 from wbplan.bench.breakdown import breakdown_table
-from wbplan.bench.race import ROUND, WARM_UP, race
+from wbplan.bench.race import COLD, ROUND, race
 from wbplan.bench.report import Row, rows_of, table_of, write_json
 from wbplan.bench.scenes import DT, SCENES
 from wbplan.bench.solvers import make_solvers, pink_is_installed
 from wbplan.errors import WbplanError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-WITHOUT_PINK = "not installed: pip install 'wbplan[bench]'"
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -38,12 +37,12 @@ def main(args: Sequence[str] | None = None) -> int:
     same_work = True
     try:
         for name in options.stack or SCENES:
-            scene = SCENES[name](options.ticks + WARM_UP)
+            scene = SCENES[name](options.ticks)
             if options.profile:
                 console.print(breakdown_table(scene))
                 continue
-            laps = race(scene, make_solvers(scene))
-            missing = [] if pink_is_installed() else [("pink", WITHOUT_PINK)]
+            solvers, missing = make_solvers(scene)
+            laps = race(scene, solvers)
             console.print(table_of(name, laps, missing))
             console.print()
             rows += rows_of(name, laps)
@@ -62,7 +61,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser("python -m wbplan.bench", description="The tick beside its peers.")
     parser.add_argument("--out", type=Path, default=Path("out/bench.json"), help="file for the numbers")
     parser.add_argument("--ticks", type=_count, default=2000, help="ticks that count, per solver (2000)")
-    parser.add_argument("--stack", action="append", choices=tuple(SCENES), help="only this one; may be repeated")
+    parser.add_argument(
+        "--stack", action="append", choices=tuple(SCENES), help="only this one; may be repeated"
+    )
     parser.add_argument("--profile", action="store_true", help="show where wbplan's own tick goes, instead")
     return parser.parse_args(args)
 
@@ -79,7 +80,8 @@ def _circumstances(ticks: int) -> str:
     pink = f", pin-pink {version('pin-pink')}" if pink_is_installed() else ""
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     return (
-        f"{ticks} ticks of {DT:g} s each in rounds of {ROUND}, one thread, wall clock; {load}; "
+        f"{ticks} ticks of {DT:g} s for each, in rounds of {ROUND} of which the first {COLD} do not count; "
+        f"one thread, wall clock; {load}; "
         f"Python {platform.python_version()}, {packages}{pink}"
     )
 

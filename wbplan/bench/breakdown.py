@@ -13,7 +13,7 @@ import pinocchio as pin
 from rich.table import Table
 
 from wbplan.backends import BACKENDS
-from wbplan.bench.race import WARM_UP
+from wbplan.bench.race import COLD
 from wbplan.bench.scenes import Scene
 from wbplan.bench.solvers import Wbplan
 from wbplan.stack import Stack
@@ -44,9 +44,8 @@ def _timed(spent: dict[str, int], backend: str) -> Iterator[None]:
         return call
 
     with ExitStack() as patches:
-        for owner, name in (
-            (Stack, "advance"), (Stack, "assemble"), (Stack, "measure"), (BACKENDS[backend], "solve"), (pin, "integrate"),
-        ):  # fmt: skip
+        methods = [(Stack, name) for name in ("advance", "assemble", "measure")]
+        for owner, name in (*methods, (BACKENDS[backend], "solve"), (pin, "integrate")):
             patches.enter_context(patch.object(owner, name, clocked(name, getattr(owner, name))))
         yield
 
@@ -66,7 +65,7 @@ def breakdown(scene: Scene, backend: str) -> dict[str, float]:
             spent["rest"] = whole - sum(spent.values())
             for name, value in (*spent.items(), ("tick", whole)):
                 samples[name].append(value / 1e3)
-    first = min(WARM_UP, scene.ticks - 1)
+    first = min(COLD, scene.ticks - 1)
     return {name: float(np.median(values[first:])) for name, values in samples.items()}
 
 

@@ -23,8 +23,8 @@ from wbplan.bench.solvers import Solver
 
 Array = NDArray[np.float64]
 
-#: Solvers that Pink is tried with, and for how many ticks.
-CANDIDATES, TRIAL = ("daqp", "proxqp"), 30
+#: QP solvers that Pink is tried with.
+CANDIDATES = ("daqp", "proxqp")
 
 
 @final
@@ -61,7 +61,9 @@ class Pink(Solver):
         locked = [full.getJointId(name) for name in scene.held]
         model = pin.buildReducedModel(full, locked, scene.q)
         model.velocityLimit = scene.speed * model.velocityLimit
-        self._places = np.array([*range(7), *(full.joints[full.getJointId(n)].idx_q for n in model.names[2:])])
+        self._places = np.array(
+            [*range(7), *(full.joints[full.getJointId(n)].idx_q for n in model.names[2:])]
+        )
         self._q = np.array(scene.q)
         configuration = pink.Configuration(model, model.createData(), self._q[self._places])
         self._configuration = configuration
@@ -104,15 +106,24 @@ class Pink(Solver):
         return self._q
 
 
-def fastest_pink(scene: Scene) -> Pink:
-    """Pink at the start of the scene, with the solver that a short trial found the fastest."""
-    medians = {}
+def fastest_pink(scene: Scene) -> tuple[Pink | None, str]:
+    """Pink at the start, with the fastest solver that gets to the end of the path; or why there is none."""
+    refused = import_module("pink.exceptions").PinkError
+    medians: dict[str, float] = {}
+    why = "no QP solver for it is installed"
     for name in CANDIDATES:
-        if name in qpsolvers.available_solvers:
-            trial, taken = Pink(scene, name), []
-            for k in range(1, min(TRIAL, scene.ticks) + 1):
+        if name not in qpsolvers.available_solvers:
+            continue
+        trial, taken = Pink(scene, name), []
+        try:
+            for k in range(1, scene.ticks + 1):
                 started = time.perf_counter_ns()
                 trial.tick(k)
                 taken.append(time.perf_counter_ns() - started)
+        except refused as error:
+            why = f"with {name}, stops at tick {len(taken)}: {' '.join(str(error).split())[:120]}"
+        else:
             medians[name] = float(np.median(taken))
-    return Pink(scene, min(medians, key=lambda name: medians[name]))
+    if not medians:
+        return None, why
+    return Pink(scene, min(medians, key=lambda name: medians[name])), ""

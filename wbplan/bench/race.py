@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 #: Ticks that a solver takes before the next one has its turn.
 ROUND = 50
-#: Ticks at the start that are not counted: caches, first solves.
-WARM_UP = 20
-#: Error of the first tracked frame, and slip of a foot or gap of a loop, that still count as the same work [m].
+#: Of these, the first ones do not count: the caches are still those of the solver before.
+COLD = 5
+#: What still counts as the same work [m]: error of the first tracked frame; slip of a foot, gap of the loop.
 FOLLOWS, STAYS = 1e-3, 1e-4
 
 
@@ -59,16 +59,14 @@ class Lap:
         return tuple(found)
 
 
-def race(
-    scene: Scene, solvers: Sequence[Solver], progress: Callable[[int, int], None] | None = None
-) -> list[Lap]:
+def race(scene: Scene, solvers: Sequence[Solver]) -> list[Lap]:
     """Run all solvers along the scene's path, in turns.
 
     Args:
-        scene: the stack; its ticks are the warm-up's and those that count.
+        scene: the stack, and how many ticks.
         solvers: at the scene's start.
-        progress: called with (ticks done, ticks) after every round.
     """
+    ticks = np.arange(scene.ticks)
     taken = np.zeros((len(solvers), scene.ticks))
     passed = np.zeros((len(solvers), scene.ticks, len(scene.q)))
     clock = time.perf_counter_ns
@@ -83,14 +81,12 @@ def race(
                     solver.tick(k + 1)
                     taken[i, k] = clock() - started
                     passed[i, k] = solver.q
-            if progress is not None:
-                progress(min(first + ROUND, scene.ticks), scene.ticks)
     finally:
         if was_on:
             gc.enable()
-    counted = taken[:, min(WARM_UP, scene.ticks - 1) :]
+    counted = ticks % ROUND >= min(COLD, scene.ticks - 1)
     return [
-        Lap(s.name, s.note, counted[i], *(_measure(scene, passed[i]) if s.moves else ()))
+        Lap(s.name, s.note, taken[i, counted], *(_measure(scene, passed[i]) if s.moves else ()))
         for i, s in enumerate(solvers)
     ]
 

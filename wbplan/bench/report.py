@@ -60,16 +60,33 @@ def table_of(stack: str, laps: Sequence[Lap], missing: Sequence[tuple[str, str]]
         laps: the solvers' runs.
         missing: (solver, why) of those that could not run.
     """
-    table = Table(title=f"stack '{stack}'", title_justify="left", box=None, header_style="bold", pad_edge=False)
+    table = Table(
+        title=f"stack '{stack}'", title_justify="left", box=None, header_style="bold", pad_edge=False
+    )
     table.add_column("solver", no_wrap=True)
-    for heading in ("median\n[us]", "p99\n[us]", "times\nPlaCo", "path\n[mm]", "feet\n[mm]", "loop\n[mm]", "margin\n[mm]"):
+    for heading in (
+        "median\n[us]",
+        "p99\n[us]",
+        "times\nPlaCo",
+        "path\n[mm]",
+        "feet\n[mm]",
+        "loop\n[mm]",
+        "margin\n[mm]",
+    ):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("note", overflow="fold")
     for row, lap in zip(rows_of(stack, laps), laps, strict=True):
         lengths = (_millimetres(length) for length in (lap.tracking, lap.slip, lap.gap, lap.margin))
-        note = "; ".join((*(f"NOT THE SAME WORK: {fault}" for fault in lap.faults), *filter(None, [lap.note])))
+        note = "; ".join(
+            (*(f"NOT THE SAME WORK: {fault}" for fault in lap.faults), *filter(None, [lap.note]))
+        )
         table.add_row(
-            row.solver, f"{row.median_us:.1f}", f"{row.p99_us:.1f}", f"{row.ratio_to_placo:.2f}", *lengths, note
+            row.solver,
+            f"{row.median_us:.1f}",
+            f"{row.p99_us:.1f}",
+            f"{row.ratio_to_placo:.2f}",
+            *lengths,
+            note,
         )
     for solver, why in missing:
         table.add_row(solver, *[""] * 7, why)
@@ -88,7 +105,8 @@ def write_json(rows: Sequence[Row], path: Path) -> None:
         beside.write_text(json.dumps([vars(row) for row in rows], indent=2) + "\n", encoding="utf-8")
         beside.replace(path)
     except OSError as error:
-        beside.unlink(missing_ok=True)
+        if beside.exists():
+            beside.unlink()
         raise BundleError(f"cannot write '{path}': {error.strerror or error}") from None
 
 

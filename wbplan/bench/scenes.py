@@ -10,7 +10,7 @@ Both paths start and end at rest and come back to where they began; longer runs 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -26,7 +26,7 @@ from wbplan.paths import Path, Waypoints
 from wbplan.robot import Robot, load_robot
 from wbplan.script import Phase
 from wbplan.state import State
-from wbplan.tasks import PoseTask, PostureTask, RelativePoseTask
+from wbplan.tasks import PoseTask, PostureTask, RelativePoseTask, Task
 
 Array = NDArray[np.float64]
 
@@ -34,12 +34,24 @@ DT = 0.01
 TIPS = ("limb1_tip", "limb2_tip")
 POSTURE_WEIGHT, POSTURE_GAIN = 0.1, 2.0
 
+#: The clamped posture, as the clamp task has it when the box is up: the body's place [m] and tilt about x
+#: [deg], and every limb's joints [deg].
+CLAMPED_BODY, CLAMPED_TILT = (0.0, -0.072, 0.180), -25.4
+CLAMPED = {
+    "limb1": (113.6, -21.7, -29.0, 51.8, -113.6),
+    "limb2": (66.4, -21.7, -29.0, 51.8, 113.6),
+    "leg3": (141.1, -18.8, 35.2),
+    "leg4": (120.3, 27.4, 59.0),
+    "leg5": (59.7, 27.4, 59.0),
+    "leg6": (38.9, -18.8, 35.2),
+}
+
 #: Corners of a lap: seconds, and where from the path's start, as ((x, y, z) [m], rotation vector [deg]).
 LAP = (
-    (2.0, (0.03, 0.00, 0.03), (4.0, 0.0, 6.0)),
-    (4.0, (0.00, 0.02, 0.02), (2.0, 6.0, 0.0)),
-    (6.0, (-0.03, 0.00, 0.03), (4.0, 0.0, -6.0)),
-    (8.0, (0.00, 0.00, 0.00), (0.0, 0.0, 0.0)),
+    (2.0, (0.018, 0.000, 0.018), (2.4, 0.0, 3.6)),
+    (4.0, (0.000, 0.012, 0.012), (1.2, 3.6, 0.0)),
+    (6.0, (-0.018, 0.000, 0.018), (2.4, 0.0, -3.6)),
+    (8.0, (0.000, 0.000, 0.000), (0.0, 0.0, 0.0)),
 )
 
 
@@ -67,7 +79,7 @@ class Scene:
 
     Attributes:
         name: the stack's.
-        robot, phase, q, placed: what `Loop` takes; the joints of q (nq,) are also what the posture task wants.
+        robot, phase, q, placed: what `Loop` takes; the posture task wants the joints of q (nq,) too.
         compiled: the phase with its names looked up; its model has the box on it.
         dt: length of a tick [s]; ticks: how many the paths are sampled for.
         feet: frames whose origins stay; loop: (root, frame) whose relative pose stays.
@@ -134,18 +146,23 @@ def _laps(start: Any, seconds: float) -> Waypoints:
 
 
 def clamp(ticks: int, dt: float = DT) -> Scene:
-    """The arms of the pose 'manipulate' with a box between their palms, on four feet."""
+    """A box of 0.8 kg between the palms of two arms, on four feet."""
     robot = load_robot("legarm_hexapod")
-    state = robot.state("manipulate")
+    q = np.array(robot.state("manipulate").q)  # fingers open, shanks withdrawn
+    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(pin.exp3(np.radians((CLAMPED_TILT, 0.0, 0.0))), np.array(CLAMPED_BODY)))
+    for limb, degrees in CLAMPED.items():
+        for number, angle in enumerate(degrees, start=1):
+            q[robot.joint_index(f"{limb}_joint{number}")[0]] = np.radians(angle)
+    state = robot.state(q)
     left, right = (state.pose(tip) for tip in TIPS)
     start = pin.SE3(np.eye(3), (left.translation + right.translation) / 2)
     width = float(np.linalg.norm(left.translation - right.translation))
     phase = Phase(
         "clamp",
-        contacts=[Contact(foot) for limb, foot in robot.feet.items() if limb not in ("limb1", "limb2")],
-        carried=[Carried(Body("box", mass=0.8, size=(width, 0.15, 0.12), pose=start), by=TIPS[0])],
-        hard=[RelativePoseTask(TIPS[1], root=TIPS[0])],
-        limits=[JointLimits(speed=0.8), SupportPolygon(margin=0.04)],
+        contacts=tuple(Contact(foot) for limb, foot in robot.feet.items() if limb not in ("limb1", "limb2")),
+        carried=(Carried(Body("box", mass=0.8, size=(width, 0.15, 0.12), pose=start), by=TIPS[0]),),
+        hard=(RelativePoseTask(TIPS[1], root=TIPS[0]),),
+        limits=(JointLimits(speed=0.8), SupportPolygon(margin=0.04)),
     )
     box = _Once(_laps(start, (ticks + 1) * dt))
     paths: dict[str, tuple[Path, float, float]] = {"box": (box, 100.0, 50.0)}
@@ -159,7 +176,9 @@ def stand(ticks: int, dt: float = DT) -> Scene:
     robot = load_robot("legarm_hexapod")
     state = robot.state("stand")
     phase = Phase(
-        "stand", contacts=[Contact(foot) for foot in robot.feet.values()], limits=[JointLimits(speed=0.8)]
+        "stand",
+        contacts=tuple(Contact(foot) for foot in robot.feet.values()),
+        limits=(JointLimits(speed=0.8),),
     )
     paths: dict[str, tuple[Path, float, float]] = {
         "body": (_laps(state.pose("body"), (ticks + 1) * dt), 100.0, 50.0)
@@ -177,10 +196,10 @@ def _scene(
     ticks: int,
     dt: float,
 ) -> Scene:
-    soft: Sequence[Any] = [
+    soft: tuple[Task, ...] = (
         *(PoseTask(frame, path, weight=(place, turn)) for frame, (path, place, turn) in paths.items()),
         PostureTask(state, weight=POSTURE_WEIGHT, gain=POSTURE_GAIN),
-    ]
+    )
     phase = replace(phase, soft=soft, duration=(ticks + 1) * dt)
     compiled = compile_phase(robot, phase, state.q, placed)
     tracked = tuple(
@@ -195,13 +214,6 @@ def _scene(
         margin=phase.margin,
         held=tuple(robot.joint_names[d.joint] for d in compiled.driven),
     )  # fmt: skip
-
-
-def held_body(scene: Scene) -> tuple[Body, str, Any] | None:
-    """The carried body, the frame that holds it, and its pose in that frame."""
-    for held in scene.compiled.held:
-        return held.body, held.holder, held.T_holder_body
-    return None
 
 
 #: Every stack, by name: `SCENES["clamp"](ticks)`.

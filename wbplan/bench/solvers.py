@@ -8,7 +8,6 @@ anything, to wbplan's disadvantage.
 from __future__ import annotations
 
 import abc
-from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import final
 
@@ -18,7 +17,7 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.bench.scenes import POSTURE_WEIGHT, Scene, held_body
+from wbplan.bench.scenes import POSTURE_WEIGHT, Scene
 from wbplan.tick import Loop
 
 Array = NDArray[np.float64]
@@ -96,9 +95,7 @@ class Placo(Solver):
             targets = [pose.homogeneous for pose in tracked.poses]
             task = solver.add_frame_task(tracked.frame, targets[0])
             # PlaCo's weights are on squares.
-            task.configure(
-                tracked.frame, "soft", tracked.position_weight**2, tracked.rotation_weight**2
-            )
+            task.configure(tracked.frame, "soft", tracked.position_weight**2, tracked.rotation_weight**2)
             self._tasks.append((task, targets))
         posture = solver.add_joints_task()
         joints = zip(scene.robot.joint_names, scene.q[7:].tolist(), strict=True)
@@ -154,14 +151,18 @@ def pink_is_installed() -> bool:
     return find_spec("pink") is not None
 
 
-def make_solvers(scene: Scene) -> Sequence[Solver]:
-    """Every solver that is installed, set up for a scene."""
-    solvers: list[Solver] = [Floor(scene), Placo(scene)]
-    if pink_is_installed():
-        from wbplan.bench.pink_solver import fastest_pink
+def make_solvers(scene: Scene) -> tuple[list[Solver], list[tuple[str, str]]]:
+    """Every solver set up for a scene; and (name, why) of those that are not to be had."""
+    ours = [Wbplan(scene, "proxqp"), Wbplan(scene, "placo")]
+    peers: list[Solver] = [Floor(scene), Placo(scene)]
+    if not pink_is_installed():
+        return [*peers, *ours], [("pink", "not installed: pip install 'wbplan[bench]'")]
+    from wbplan.bench.pink_solver import fastest_pink
 
-        solvers.append(fastest_pink(scene))
-    return [*solvers, Wbplan(scene, "proxqp"), Wbplan(scene, "placo")]
+    found, why = fastest_pink(scene)
+    if found is None:
+        return [*peers, *ours], [("pink", why)]
+    return [*peers, found, *ours], []
 
 
 def _urdf(scene: Scene) -> str:
@@ -169,18 +170,14 @@ def _urdf(scene: Scene) -> str:
     root = etree.fromstring(scene.robot.urdf_text.encode())
     for looks in list(root.iter("visual", "collision")):
         looks.getparent().remove(looks)
-    carried = held_body(scene)
-    if carried is not None:
-        body, holder, pose = carried
-        x, y, z = pose.translation
-        roll, pitch, yaw = pin.rpy.matrixToRpy(pose.rotation)
-        added = etree.fromstring(
-            f"""<added>
-            <link name="{body.name}"><inertial><mass value="{body.mass!r}"/>
-            <inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
-            <joint name="{body.name}_joint" type="fixed"><parent link="{holder}"/><child link="{body.name}"/>
-            <origin xyz="{x!r} {y!r} {z!r}" rpy="{roll!r} {pitch!r} {yaw!r}"/></joint>
-            </added>""".replace("np.float64(", "").replace(")", "")
-        )
-        root.extend(list(added))
+    for held in scene.compiled.held:
+        name, pose = held.body.name, held.T_holder_body
+        inertial = etree.SubElement(etree.SubElement(root, "link", name=name), "inertial")
+        etree.SubElement(inertial, "mass", value=repr(held.body.mass))
+        etree.SubElement(inertial, "inertia", ixx="1e-3", iyy="1e-3", izz="1e-3", ixy="0", ixz="0", iyz="0")
+        joint = etree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
+        etree.SubElement(joint, "parent", link=held.holder)
+        etree.SubElement(joint, "child", link=name)
+        xyz, rpy = pose.translation.tolist(), pin.rpy.matrixToRpy(pose.rotation).tolist()
+        etree.SubElement(joint, "origin", xyz=" ".join(map(repr, xyz)), rpy=" ".join(map(repr, rpy)))
     return str(etree.tostring(root, encoding="unicode"))
