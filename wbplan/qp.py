@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, final
 
@@ -13,20 +14,33 @@ Array = NDArray[np.float64]
 
 @final
 @dataclass(frozen=True, slots=True)
+class Multipliers:
+    """Lagrange multipliers of a solution.
+
+    Attributes:
+        hard: (m,) of the hard rows.
+        edges: (E,) of the support polygon's edges, 0 or more.
+        box: (nf,) of the box, positive at an upper bound.
+    """
+
+    hard: Array
+    edges: Array
+    box: Array
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Solution:
     """A step and what held it back.
 
     Attributes:
         step: (nv,) tangent step dq over one tick [m, rad].
-        hard: multipliers (m,) of the hard rows; None where the backend gives none.
-        edges: multipliers (E,) of the support polygon's edges, 0 or more.
-        box: multipliers (nf,) of the box, positive at an upper bound.
+        multipliers: gives what held the step back, until the backend solves again; None where the backend
+            has no multipliers.
     """
 
     step: Array
-    hard: Array | None = None
-    edges: Array | None = None
-    box: Array | None = None
+    multipliers: Callable[[], Multipliers] | None = None
 
 
 class Backend(Protocol):

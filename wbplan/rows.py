@@ -7,17 +7,23 @@ before soft ones. `kernels` does the arithmetic; this module knows the layout.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wbplan import kernels
 from wbplan.compiled import WORLD, ComTarget, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.sampling import sample
 
 Array = NDArray[np.float64]
+
+#: Ticks for which the targets are evaluated at once.
+STRETCH = 128
 
 
 def support_mask(model: Any, frame: int) -> Array:
@@ -32,6 +38,27 @@ def support_mask(model: Any, frame: int) -> Array:
     return mask
 
 
+@dataclass
+class _Ahead:
+    """Where the targets that move will be in the next ticks.
+
+    Attributes:
+        t: time [s] at which the tick number `next` of this stretch starts.
+        places, turns, coms: which goals move; points (STRETCH, k, 3), rotations, com_points: where to.
+        motion: (STRETCH, n) how far each row's target moves in each tick.
+    """
+
+    t: float
+    places: NDArray[np.intp]
+    turns: NDArray[np.intp]
+    coms: NDArray[np.intp]
+    points: Array
+    rotations: Array
+    com_points: Array
+    motion: Array
+    next: int = 0
+
+
 @final
 class Rows:
     """Rows of frame and CoM targets: layout, targets now, errors.
@@ -44,7 +71,7 @@ class Rows:
         error: (n,) target minus actual at the last `measure`.
         position_targets, position_goal (K, 3), position_error (K, 3): targets that ask for a position, where
             it is asked for now, and all three axes of its error; rotation_targets, rotation_goal (T, 3, 3),
-            rotation_error (T, 3) likewise; com_targets, com_goal (M, 3), com_motion (M, 3).
+            rotation_error (T, 3) likewise; com_targets, com_goal (M, 3), com_error (M, 3).
     """
 
     def __init__(self, model: Any, frame_targets: Sequence[FrameTarget], com_targets: Sequence[ComTarget]) -> None:
@@ -60,10 +87,11 @@ class Rows:
         self.place, self.turn = pairs(self.position_targets), pairs(self.rotation_targets)
         self.position_goal, self.rotation_goal = np.zeros((places, 3)), np.tile(np.eye(3), (turns, 1, 1))
         self.com_goal = np.zeros((coms, 3))
-        self.all_error, self._all_motion = np.zeros((places + turns + coms, 3)), np.zeros((places + turns + coms, 3))
+        self.all_error = np.zeros((places + turns + coms, 3))
         self.position_error, self.rotation_error = self.all_error[:places], self.all_error[places : places + turns]
-        self.com_motion = self._all_motion[places + turns :]
+        self.com_error = self.all_error[places + turns :]
         self.frame_groups = places + turns
+        self._ahead: _Ahead | None = None
         self._choose(model, slot)
         self._moving()
         self.aim(0.0)
@@ -109,7 +137,9 @@ class Rows:
         self.live = any(path.live for path, *_ in self._paths)
 
     def aim(self, t: float) -> None:
-        """Put all targets where they are at time `t` [s]."""
+        """Put all targets where they are at time `t` [s], at rest."""
+        self._ahead = None
+        self.motion[:] = 0.0
         for path, place, turn, com in self._paths:
             value = path.at(t)
             pose = isinstance(value, pin.SE3)
@@ -120,25 +150,47 @@ class Rows:
             if com is not None:
                 self.com_goal[com] = value
 
-    def advance(self, t: float) -> None:
-        """Move the targets on to time `t` [s] and keep how far they went in `motion`."""
-        places = len(self.position_goal)
-        for path, place, turn, com in self._moving_paths:
-            value = path.at(t)
-            pose = isinstance(value, pin.SE3)
-            if place is not None:
-                goal = value.translation if pose else value
-                np.subtract(goal, self.position_goal[place], out=self._all_motion[place])
-                self.position_goal[place] = goal
-            if turn is not None:
-                goal = value.rotation if pose else value
-                self._all_motion[places + turn] = pin.log3(goal @ self.rotation_goal[turn].T)
-                self.rotation_goal[turn] = goal
-            if com is not None:
-                np.subtract(value, self.com_goal[com], out=self.com_motion[com])
-                self.com_goal[com] = value
-        if self._moving_paths:
-            self._all_motion.take(self.chosen, out=self.motion)
+    def advance(self, t: float, dt: float) -> None:
+        """Move the targets on from `t` to `t + dt` [s] and keep how far they went in `motion`."""
+        if self.live or not self._moving_paths:
+            if self.live:
+                self.aim(t + dt)
+            return
+        ahead = self._ahead
+        if ahead is None or ahead.next == STRETCH or abs(ahead.t - t) > 1e-9 * dt:
+            ahead = self._ahead = self._look_ahead(t, dt)
+        k = ahead.next
+        self.position_goal[ahead.places] = ahead.points[k]
+        self.rotation_goal[ahead.turns] = ahead.rotations[k]
+        self.com_goal[ahead.coms] = ahead.com_points[k]
+        self.motion[:] = ahead.motion[k]
+        ahead.next, ahead.t = k + 1, t + dt
+
+    def _look_ahead(self, t: float, dt: float) -> _Ahead:
+        """Targets of the next ticks, all at once."""
+        times = t + dt * np.arange(STRETCH + 1)
+        samples = [(item, sample(item[0], times)) for item in self._moving_paths]
+        places = [(place, points) for (_, place, _, _), (points, _) in samples if place is not None]
+        turns = [(turn, rotations) for (_, _, turn, _), (_, rotations) in samples if turn is not None]
+        coms = [(com, points) for (_, _, _, com), (points, _) in samples if com is not None]
+        motion = np.zeros((STRETCH, *self.all_error.shape))
+        for place, points in places:
+            motion[:, place] = np.diff(points, axis=0)
+        for turn, rotations in turns:
+            steps = rotations[1:] @ rotations[:-1].transpose(0, 2, 1)
+            motion[:, len(self.place) + turn] = Rotation.from_matrix(steps).as_rotvec()
+        for com, points in coms:
+            motion[:, self.frame_groups + com] = np.diff(points, axis=0)
+        return _Ahead(
+            t,
+            np.array([place for place, _ in places], dtype=np.intp),
+            np.array([turn for turn, _ in turns], dtype=np.intp),
+            np.array([com for com, _ in coms], dtype=np.intp),
+            np.array([points[1:] for _, points in places]).reshape(-1, STRETCH, 3).swapaxes(0, 1),
+            np.array([rotations[1:] for _, rotations in turns]).reshape(-1, STRETCH, 3, 3).swapaxes(0, 1),
+            np.array([points[1:] for _, points in coms]).reshape(-1, STRETCH, 3).swapaxes(0, 1),
+            motion.reshape(STRETCH, -1)[:, self.chosen],
+        )
 
     def measure(self, kinematics: Kinematics, normals: Array, offsets: Array) -> tuple[float, float]:
         """Write errors at the kinematics' q; the largest of a hard row, and the least distance to an edge [m]."""

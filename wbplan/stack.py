@@ -59,7 +59,8 @@ class Stack:
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
         damping: what stands on the whole diagonal of H, at the last `assemble`.
-        driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick.
+        driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
+            driving: whether any of them moves.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones; hard_joint_goal: their targets.
     """
 
@@ -71,6 +72,7 @@ class Stack:
         self.driven = np.array([6 + d.joint for d in phase.driven], dtype=np.intp)
         self.driven_step = np.zeros(len(self.driven))
         self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
+        self.driving = bool(self._moving_driven)
         self.drift, self.margin, self.damping = 0.0, np.inf, 0.0
         self._hard_rows()
         self._soft_rows()
@@ -168,15 +170,15 @@ class Stack:
     def aim(self, t: float) -> None:
         """Put all targets where they are at time `t` [s]."""
         self.rows.aim(t)
-        self.rows.motion[:] = 0.0
         for i, (_, path, _) in enumerate(self.hard_joints):
             self.hard_joint_goal[i] = float(path.at(t))
         for posture in self.postures:
             posture.aim(t)
 
     def advance(self, t: float) -> None:
-        """Move all targets on to time `t` [s], keeping how far each goes, and so the driven joints."""
-        self.rows.advance(t)
+        """Move all targets on from time `t` [s] by a tick, keeping how far each goes, and so the driven joints."""
+        self.rows.advance(t, self.dt)
+        t += self.dt
         for posture in self.postures:
             posture.advance(t)
         q = self.kinematics.q

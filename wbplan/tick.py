@@ -9,6 +9,7 @@ promised is put back by a least-norm correction within the same tick and the sam
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -183,7 +184,7 @@ class Loop:
             stack.measure(q)
         before = stack.margin
         ends = self.t + self.dt
-        stack.advance(ends)
+        stack.advance(self.t)
         try:
             solution = self._backend.solve()
             new = self._keep(q, solution.step, before)
@@ -200,9 +201,9 @@ class Loop:
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""
         stack, model = self.stack, self.compiled.model
-        if not np.isfinite(step).all():
-            raise SolveError(f"phase '{self.compiled.phase.name}': the solver's step is not finite")
         new: Array = pin.integrate(model, q, step)
+        if not math.isfinite(new.sum()):
+            raise SolveError(f"phase '{self.compiled.phase.name}': the solver's step is not finite")
         stack.measure(new)
         if self._kept(before):
             return new
@@ -246,13 +247,14 @@ class Loop:
         stack = self.stack
         pull = max(float(np.abs(stack.g).max(initial=0.0)), 1e-12)
         found: list[Active] = []
-        if solution.box is not None and solution.edges is not None and solution.hard is not None:
-            for k in np.flatnonzero(np.abs(solution.box) > FAINT * pull):
-                found.append(self._bound(int(k), float(solution.box[k]), pull))
-            for k in np.flatnonzero(np.abs(solution.edges) > FAINT * pull):
-                found.append(Active(stack.edge_names()[k], "margin", float(abs(solution.edges[k]) / pull)))
+        if solution.multipliers is not None:
+            m = solution.multipliers()
+            for k in np.flatnonzero(np.abs(m.box) > FAINT * pull):
+                found.append(self._bound(int(k), float(m.box[k]), pull))
+            for k in np.flatnonzero(np.abs(m.edges) > FAINT * pull):
+                found.append(Active(stack.edge_names()[k], "margin", float(abs(m.edges[k]) / pull)))
             hard: dict[str, float] = {}
-            for (label, _), y in zip(stack.hard_names(), solution.hard, strict=True):
+            for (label, _), y in zip(stack.hard_names(), m.hard, strict=True):
                 hard[label] = max(hard.get(label, 0.0), abs(float(y)) / pull)
             found += [Active(label, "hard", y) for label, y in hard.items() if y > FAINT]
         else:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
-from wbplan.errors import SolveError, SpecError
+from wbplan.errors import SpecError
 from wbplan.qp import Solution
 from wbplan.stack import MARGIN_RESERVE, REGULARISATION, Stack
 
@@ -210,8 +210,6 @@ class PlacoBackend:
             except RuntimeError as error:
                 self._stack.assemble()
                 raise solve_error(self._stack, f"PlaCo finds no step ({_one_line(error)})") from None
-        if not np.isfinite(step).all():
-            raise SolveError(f"phase '{self._stack.phase.phase.name}': PlaCo's step is not finite")
         return Solution(step)
 
     def _solve(self) -> Array:
@@ -220,10 +218,10 @@ class PlacoBackend:
         robot.update_kinematics()
         self._aim()
         step: Array = self._solver.solve(False)
-        step[stack.driven] = stack.driven_step
+        if stack.driving:
+            step[stack.driven] = stack.driven_step
         stack.fill_box()
-        free = stack.phase.free
-        step[free] = np.clip(step[free], stack.lower, stack.upper)
+        step[stack.free] = np.minimum(np.maximum(step[stack.free], stack.lower), stack.upper)
         return step
 
     def _aim(self) -> None:
@@ -249,8 +247,7 @@ class PlacoBackend:
         for k, j, name, task in self._driven:
             task.set_joint(name, float(q[j] + stack.driven_step[k]))
         for task, k, lag in self._coms:
-            goal = rows.com_goal[k]
-            task.target_world = goal - lag * (goal - rows.com_motion[k] - stack.kinematics.com)
+            task.target_world = rows.com_goal[k] - lag * rows.com_error[k]
         for task, joints, posture in self._postures:
             goals = posture.next_goal(q[stack.q_index])
             for k, name in joints:

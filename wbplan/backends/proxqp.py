@@ -11,11 +11,8 @@ import numpy as np
 import proxsuite
 
 from wbplan.diagnose import solve_error
-from wbplan.qp import Solution
-from wbplan.stack import Stack
-
-#: Largest residual [m or rad] of a hard row or bound that counts as kept.
-TOLERANCE = 1e-7
+from wbplan.qp import Multipliers, Solution
+from wbplan.stack import UNBOUNDED, Stack
 
 
 @final
@@ -28,7 +25,8 @@ class ProxqpBackend:
         self._stack = stack
         self._qp = self._new_solver()
         self._started = False
-        self._unbounded = np.full(len(stack.d), -1e20)
+        self._unbounded = np.full(len(stack.d), -UNBOUNDED)
+        self._rest = np.zeros(stack.phase.model.nv)
 
     def _new_solver(self) -> proxsuite.proxqp.dense.QP:
         stack = self._stack
@@ -48,12 +46,15 @@ class ProxqpBackend:
         s.assemble()
         if not (self._run() or self._retry()):
             raise solve_error(s, "the QP has no solution")
-        results, edges = self._qp.results, len(s.d)
-        x = np.minimum(np.maximum(results.x, s.lower), s.upper)
-        step = np.zeros(s.phase.model.nv)
-        step[s.phase.free] = x
-        step[s.driven] = s.driven_step
-        return Solution(step, results.y, results.z[:edges], results.z[edges:])
+        step = self._rest.copy()
+        step[s.free] = np.minimum(np.maximum(self._qp.results.x, s.lower), s.upper)
+        if s.driving:
+            step[s.driven] = s.driven_step
+        return Solution(step, self._multipliers)
+
+    def _multipliers(self) -> Multipliers:
+        results, edges = self._qp.results, len(self._stack.d)
+        return Multipliers(np.array(results.y), np.array(results.z[:edges]), np.array(results.z[edges:]))
 
     def _run(self) -> bool:
         s, qp = self._stack, self._qp
@@ -72,7 +73,6 @@ class ProxqpBackend:
         return self._run()
 
     def _good(self) -> bool:
-        """Solved, and finite: the solver's own residuals are absolute, in the rows' units."""
-        info = self._qp.results.info
-        solved = info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED
-        return solved and bool(np.isfinite(self._qp.results.x.sum())) and info.pri_res <= TOLERANCE
+        """Solved: the solver's own residuals are absolute, in the rows' units, and below `eps_abs`."""
+        status = self._qp.results.info.status
+        return bool(status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
