@@ -249,9 +249,7 @@ def _driven(robot: Robot, phase: Phase, state: State, now: Mapping[str, str | No
             raise SpecError(f"{what}: starts at {first:.6g}, the joint is at {here:.6g}; start it at AS_IS")
         paths[joint] = path
     paths.update({joint: Hold(state.joint(joint)) for joint in phase.locked})
-    if phase.joint_limits is not None:
-        for joint, path in paths.items():
-            _check_driven_range(robot, joint, path, phase)
+    _check_given(robot, phase, paths)
     return tuple(Driven(robot.joint_index(joint)[1] - 6, path) for joint, path in sorted(paths.items()))
 
 
@@ -260,17 +258,35 @@ def _towards(here: float, value: float, phase: Phase) -> Path:
     return Hold(here) if abs(here - value) < 1e-9 else MinJerk(here, value, phase.duration)
 
 
-def _check_driven_range(robot: Robot, joint: str, path: Path, phase: Phase) -> None:
-    """A joint whose motion is given stays within its limits, or comes back to them."""
-    lower, upper = robot.joint_limits(joint)
-    values = np.array([float(path.at(t)) for t in np.linspace(0.0, phase.duration, 201)])
-    low, high = min(lower, values[0]), max(upper, values[0])
-    wrong = values[~((values >= low - 1e-9) & (values <= high + 1e-9))]
-    if len(wrong):
-        raise SpecError(
-            f"phase '{phase.name}': joint '{joint}' would be driven to {wrong[0]:.4g}, "
-            f"its limits are {lower:.4g} to {upper:.4g}"
+def _check_given(robot: Robot, phase: Phase, paths: Mapping[str, Path]) -> None:
+    """Joints whose motion is given stay within their limits, or come back to them, and are not too fast."""
+    at = f"phase '{phase.name}': joint"
+    times = np.linspace(0.0, phase.duration, 201)
+    too_fast: list[tuple[float, str, str]] = []
+    for joint, path in paths.items():
+        values = np.array([float(path.at(t)) for t in times])
+        lower, upper = robot.joint_limits(joint)
+        low, high = min(lower, values[0]) - 1e-9, max(upper, values[0]) + 1e-9
+        held = (values >= low) & (values <= high) if phase.joint_limits is not None else np.isfinite(values)
+        wrong = values[~held]
+        if len(wrong):
+            raise SpecError(
+                f"{at} '{joint}' would be driven to {wrong[0]:.4g}, its limits are {lower:.4g} to {upper:.4g}"
+            )
+        speed = float(robot.model.velocityLimit[robot.joint_index(joint)[1]])
+        # A tick sees a little more of a peak than samples do.
+        rate = 1.0001 * float(np.abs(np.diff(values)).max()) / times[1]
+        if rate > speed:
+            says = f"{at} '{joint}' would have to move at {rate:.3g}, its limit is {speed:.3g}"
+            too_fast.append((rate / speed, joint, says))
+    if too_fast:
+        factor, joint, says = max(too_fast)
+        own = joint in phase.driven and not phase.driven[joint].constant
+        seconds = np.ceil(100.0 * factor * phase.duration) / 100.0
+        way = (
+            f"make its path {factor:.3g} times as long" if own else f"give the phase {seconds:.2f} s or more"
         )
+        raise SpecError(f"{says}; {way}")
 
 
 def _check_feet(

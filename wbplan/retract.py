@@ -15,7 +15,7 @@ from wbplan.stack import Stack
 Array = NDArray[np.float64]
 
 #: Drift of a hard row [m or rad] that is left to the next tick.
-DRIFT = 2e-6
+DRIFT = 1e-5
 MOST = 4
 
 

@@ -3,7 +3,7 @@
     targets move on -> rows -> solve -> integrate -> measure -> keep, correct or refuse
 
 Nothing is integrated that is not finite or leaves a hard row; and what was integrated is measured, since
-rows are linear and the robot is not. A foot or loop that drifted by more than a hundredth of what is
+rows are linear and the robot is not. A foot or loop that drifted by more than a tenth of what is
 promised is put back by a least-norm correction within the same tick and the same speed limits.
 """
 

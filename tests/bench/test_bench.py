@@ -84,12 +84,13 @@ def test_clamp_is_the_whole_stack() -> None:
     assert len(scene.compiled.free) == 28
 
 
-def test_tips_ride_on_the_box() -> None:
-    scene = SCENES["clamp"](40)
-    box, *tips = scene.tracked
+def test_tips_go_with_the_box() -> None:
+    """Their own splines, and yet where the box takes them: to a tenth of a millimetre."""
+    box, *tips = SCENES["clamp"](400).tracked
     for tip in tips:
-        offsets = [a.actInv(b) for a, b in zip(box.poses, tip.poses, strict=True)]
-        assert all(offset.isApprox(offsets[0], 1e-9) for offset in offsets)
+        offset = box.poses[0].actInv(tip.poses[0])
+        for a, b in zip(box.poses, tip.poses, strict=True):
+            assert np.linalg.norm((a * offset).translation - b.translation) < 1e-4
 
 
 def test_longer_runs_go_round_again() -> None:

@@ -21,7 +21,7 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
+from wbplan.compiled import WORLD, ComTarget, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.qp import Solution
@@ -51,6 +51,7 @@ class PlacoBackend:
         if names != list(phase.robot.joint_names):
             raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
         self._soft_labels: set[str] = set()
+        self._widened: set[int] = set()
         self._build()
 
     # -- once a phase ------------------------------------------------------------------------------------
@@ -63,12 +64,7 @@ class PlacoBackend:
         self._soft_labels |= _dependent(stack)
         solver = self._solver = placo.KinematicsSolver(self._robot)
         solver.dt = stack.dt
-        self._position_tasks = [self._frame_tasks(t, rotation=False) for t in stack.rows.position_targets]
-        self._rotation_tasks = [self._frame_tasks(t, rotation=True) for t in stack.rows.rotation_targets]
-        rows = stack.rows
-        pull = lambda t: 1.0 if t.hard else 1.0 - float(np.exp(-t.gain * stack.dt))  # noqa: E731
-        self._position_lag = np.array([[1.0 - pull(t)] for t in rows.position_targets]).reshape(-1, 1)
-        self._rotation_lag = [1.0 - pull(t) for t in rows.rotation_targets]
+        self._sort_frame_tasks()
         self._regularisation = solver.add_regularization_task(REGULARISATION + phase.damping)
         self._joints_given()
         self._com_tasks()
@@ -125,14 +121,14 @@ class PlacoBackend:
     def _com_tasks(self) -> None:
         self._coms = []
         for k, target in enumerate(self._stack.phase.com_targets):
-            lag = 0.0 if target.hard else float(np.exp(-target.gain * self._stack.dt))
+            lag = self._lag(target)
             for weight in sorted(set(target.weight[target.weight > 0])):
                 axes = "".join(axis for axis, w in zip("xyz", target.weight, strict=True) if w == weight)
                 task = self._solver.add_com_task(np.zeros(3))
                 if axes != "xyz":
                     task.mask.set_axises(axes, "task")
                 task.configure(f"{target.label} {axes}", *self._priority(target.label, target.hard, weight))
-                self._coms.append((task, k, lag))
+                self._coms.append((k, lag, task))
 
     def _posture_tasks(self) -> None:
         """One PlaCo task for each distinct weight among the joints; hard ones each by itself."""
@@ -143,11 +139,12 @@ class PlacoBackend:
         for posture in stack.postures:
             for square in sorted(set(posture.stiffness[posture.stiffness > 0])):
                 task = self._solver.add_joints_task()
-                joints = [(int(k), names[free[k]]) for k in np.flatnonzero(posture.stiffness == square)]
-                for k, name in joints:
+                columns = np.flatnonzero(posture.stiffness == square)
+                joints = [names[free[k]] for k in columns]
+                for k, name in zip(columns, joints, strict=True):
                     task.set_joint(name, float(q[7 + free[k]]))
                 task.configure(f"{posture.label} {square}", "soft", square)
-                self._postures.append((task, joints, posture))
+                self._postures.append((task, joints, columns, posture))
         self._hard_joints = []
         for joint, _, label in stack.hard_joints:
             task = self._solver.add_joints_task()
@@ -166,7 +163,6 @@ class PlacoBackend:
             for j, name in enumerate(phase.robot.joint_names):
                 share = 1.0 + 1e-6 if j in given else limits.speed
                 robot.set_velocity_limit(name, float(share * phase.model.velocityLimit[6 + j]))
-            self._widened: set[int] = set()
             self._admit_outsiders()
         self._polygon = None
         if phase.polygon is not None and phase.phase.support is not None:
@@ -227,31 +223,30 @@ class PlacoBackend:
     def _aim(self) -> None:
         """Put every target where this tick's step should lead."""
         stack, rows = self._stack, self._stack.rows
-        goals = rows.position_goal - self._position_lag * rows.position_error
-        for tasks, target, goal in zip(self._position_tasks, rows.position_targets, goals, strict=True):
-            for task in tasks:
-                if target.root == WORLD:
-                    task.target_world = goal
-                else:
-                    task.target = goal
-        for k, (tasks, target) in enumerate(zip(self._rotation_tasks, rows.rotation_targets, strict=True)):
+        if self._moving_places or self._moving_relative_places:
+            goals = rows.position_goal - self._position_lag * rows.position_error
+            for k, task in self._moving_places:
+                task.target_world = goals[k]
+            for k, task in self._moving_relative_places:
+                task.target = goals[k]
+        for k, lag, world, tasks in self._moving_turns:
             rotation = rows.rotation_goal[k]
-            if self._rotation_lag[k] > 0.0:
-                rotation = pin.exp3(-self._rotation_lag[k] * rows.rotation_error[k]) @ rotation
+            if lag > 0.0:
+                rotation = pin.exp3(rows.rotation_error[k] * -lag) @ rotation
             for task in tasks:
-                if target.root == WORLD:
+                if world:
                     task.R_world_frame = rotation
                 else:
                     task.R_a_b = rotation
-        q = stack.kinematics.q
-        for k, j, name, task in self._driven:
-            task.set_joint(name, float(q[j] + stack.driven_step[k]))
-        for task, k, lag in self._coms:
+        for k, lag, task in self._coms:
             task.target_world = rows.com_goal[k] - lag * rows.com_error[k]
-        for task, joints, posture in self._postures:
-            goals = posture.next_goal(q[stack.q_index])
-            for k, name in joints:
-                task.set_joint(name, float(goals[k]))
+        joints = stack.kinematics.q[stack.q_index] if self._postures else None
+        for task, names, columns, posture in self._postures:
+            goals = posture.next_goal(joints)[columns].tolist()
+            for name, goal in zip(names, goals, strict=True):
+                task.set_joint(name, goal)
+        for k, j, name, task in self._driven:
+            task.set_joint(name, float(stack.kinematics.q[j] + stack.driven_step[k]))
         for (task, name), goal in zip(self._hard_joints, stack.hard_joint_goal, strict=True):
             task.set_joint(name, float(goal))
         self._regularisation.set_weight(stack.soft_damping())
@@ -259,6 +254,32 @@ class PlacoBackend:
             self._polygon.margin = self._margin()
         if self._widened:
             self._admit_outsiders()
+
+    def _sort_frame_tasks(self) -> None:
+        """Put what never moves in its place for good; list the rest by what `_aim` has to do."""
+        rows = self._stack.rows
+        still = lambda target: target.hard and target.path.constant  # noqa: E731
+        self._moving_places: list[tuple[int, Any]] = []
+        self._moving_relative_places: list[tuple[int, Any]] = []
+        self._moving_turns: list[tuple[int, float, bool, list[Any]]] = []
+        for k, target in enumerate(rows.position_targets):
+            world = target.root == WORLD
+            for task in self._frame_tasks(target, rotation=False):
+                setattr(task, "target_world" if world else "target", rows.position_goal[k].copy())
+                if not still(target):
+                    (self._moving_places if world else self._moving_relative_places).append((k, task))
+        for k, target in enumerate(rows.rotation_targets):
+            world = target.root == WORLD
+            tasks = self._frame_tasks(target, rotation=True)
+            for task in tasks:
+                setattr(task, "R_world_frame" if world else "R_a_b", rows.rotation_goal[k].copy())
+            if not still(target):
+                self._moving_turns.append((k, self._lag(target), world, tasks))
+        self._position_lag = np.array([[self._lag(t)] for t in rows.position_targets]).reshape(-1, 1)
+
+    def _lag(self, target: FrameTarget | ComTarget) -> float:
+        """The share of a soft target's error that a tick leaves."""
+        return 0.0 if target.hard else float(np.exp(-target.gain * self._stack.dt))
 
 
 def _dependent(stack: Stack) -> set[str]:

@@ -17,8 +17,9 @@ from wbplan.bench.solvers import Solver
 
 Array = NDArray[np.float64]
 
-#: Ticks that a solver takes before the next one has its turn.
-ROUND = 50
+#: Ticks that a solver takes before the next one has its turn. A prime, so that no solver's own rhythm, as of
+#: targets looked up for many ticks at once, falls on the same place of every turn.
+ROUND = 53
 #: Of these, the first ones do not count: the caches are still those of the solver before.
 COLD = 5
 #: What still counts as the same work [m]: error of the first tracked frame; slip of a foot, gap of the loop.

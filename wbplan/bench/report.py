@@ -66,6 +66,7 @@ def table_of(stack: str, laps: Sequence[Lap], missing: Sequence[tuple[str, str]]
     table.add_column("solver", no_wrap=True)
     for heading in (
         "median\n[us]",
+        "mean\n[us]",
         "p99\n[us]",
         "times\nPlaCo",
         "path\n[mm]",
@@ -83,13 +84,14 @@ def table_of(stack: str, laps: Sequence[Lap], missing: Sequence[tuple[str, str]]
         table.add_row(
             row.solver,
             f"{row.median_us:.1f}",
+            f"{lap.nanoseconds.mean() / 1e3:.1f}",
             f"{row.p99_us:.1f}",
             f"{row.ratio_to_placo:.2f}",
             *lengths,
             note,
         )
     for solver, why in missing:
-        table.add_row(solver, *[""] * 7, why)
+        table.add_row(solver, *[""] * 8, why)
     return table
 
 

@@ -109,32 +109,8 @@ class Scene:
         return 1.0 if limits is None else limits.speed
 
 
-@final
-class _Once(Path):
-    """A path of which the last value is kept: several targets ride on it."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._t, self._value = path, np.nan, None
-
-    def at(self, t: float) -> Any:
-        if t != self._t:
-            self._t, self._value = t, self._path.at(t)
-        return self._value
-
-
-@final
-class _Riding(Path):
-    """The pose of something fixed to what another path leads."""
-
-    def __init__(self, leader: Path, offset: Any) -> None:
-        self._leader, self._offset = leader, offset
-
-    def at(self, t: float) -> Any:
-        return self._leader.at(t) * self._offset
-
-
-def _laps(start: Any, seconds: float) -> Waypoints:
-    """Laps around `start`, for at least that long."""
+def _laps(start: Any, seconds: float, offset: Any = None) -> Waypoints:
+    """Laps around `start`, for at least that long; of what is fixed to it at `offset`, if given."""
     times, points = [0.0], [pin.SE3(start)]
     while times[-1] < seconds:
         begun = times[-1]
@@ -142,7 +118,7 @@ def _laps(start: Any, seconds: float) -> Waypoints:
             times.append(begun + t)
             rotation = pin.exp3(np.radians(turn)) @ start.rotation
             points.append(pin.SE3(rotation, start.translation + np.array(move)))
-    return Waypoints(tuple(times), tuple(points))
+    return Waypoints(tuple(times), tuple(point if offset is None else point * offset for point in points))
 
 
 def clamp(ticks: int, dt: float = DT) -> Scene:
@@ -164,10 +140,10 @@ def clamp(ticks: int, dt: float = DT) -> Scene:
         hard=(RelativePoseTask(TIPS[1], root=TIPS[0]),),
         limits=(JointLimits(speed=0.8), SupportPolygon(margin=0.04)),
     )
-    box = _Once(_laps(start, (ticks + 1) * dt))
-    paths: dict[str, tuple[Path, float, float]] = {"box": (box, 100.0, 50.0)}
+    seconds = (ticks + 1) * dt
+    paths: dict[str, tuple[Path, float, float]] = {"box": (_laps(start, seconds), 100.0, 50.0)}
     for tip in TIPS:
-        paths[tip] = (_Riding(box, start.actInv(state.pose(tip))), 20.0, 10.0)
+        paths[tip] = (_laps(start, seconds, start.actInv(state.pose(tip))), 20.0, 10.0)
     return _scene("clamp", state, robot, phase, {"box": start}, paths, ticks, dt)
 
 

@@ -1,8 +1,8 @@
 """The solvers that are timed, each set up from the same scene.
 
-The peers get each tick's targets ready-made, as numbers; wbplan evaluates its paths within its tick, and it
-also measures what it has done, corrects drift and refuses steps that break a promise. So the ratios are, if
-anything, to wbplan's disadvantage.
+The peers get each tick's targets ready-made, as numbers, and do no more than their users would have them do.
+wbplan evaluates its paths itself, for many ticks at once where it can: the mean has that in it, the median
+only in part. It also measures what it has done, corrects drift, and refuses steps that break a promise.
 """
 
 from __future__ import annotations

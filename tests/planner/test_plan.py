@@ -1,0 +1,432 @@
+"""A script becomes a plan: what is recorded, what is kept, and that nothing else is touched."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbplan as wb
+
+FOUR = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")
+
+
+def on(feet: tuple[str, ...] = FOUR) -> list[wb.Contact]:
+    return [wb.Contact(foot, friction=0.7) for foot in feet]
+
+
+def up(pose: pin.SE3, *by: float) -> pin.SE3:
+    return pin.SE3(pose.rotation, pose.translation + np.array(by))
+
+
+def pose_of(row: np.ndarray) -> pin.SE3:
+    return pin.XYZQUATToSE3(np.array(row))
+
+
+def gap(a: pin.SE3, b: pin.SE3) -> float:
+    return float(np.linalg.norm(pin.log6(a.actInv(b)).vector))
+
+
+# ----------------------------------------------------------------------------------- the page-one example
+
+
+def test_the_first_example_plans_checks_and_saves(tmp_path: Path) -> None:
+    """As a newcomer types it, but for where the box goes."""
+    robot = wb.load_robot("legarm_hexapod")
+    state = robot.state("manipulate")
+    start = state.pose("limb1_tip")
+    goal = up(start, 0.0, -0.02, 0.05)
+
+    box = wb.Body("box", mass=0.8, size=(0.25, 0.15, 0.12))
+    phase = wb.Phase(
+        "lift",
+        contacts=[wb.Contact(f, friction=0.7) for f in ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")],
+        carried=[wb.Carried(box, by="limb1_tip")],
+        hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip", target=wb.AS_IS)],
+        soft=[
+            wb.PoseTask("box", wb.MinJerk(start, goal, duration=3.0), weight=(20.0, 5.0)),
+            wb.PostureTask(weight=0.1),
+        ],
+        limits=[wb.JointLimits(), wb.SupportPolygon(margin=0.02)],
+        duration=3.0,
+    )
+    plan = wb.plan(robot, wb.Script(phase), start=state, dt=0.01, backend="proxqp")
+    assert plan.report["ticks"] == 300
+    assert plan.report["seconds_motion"] == pytest.approx(3.0)
+    assert plan.report["seconds_planning"] > 0.0
+    assert 0.0 < plan.report["median_us"] <= plan.report["p99_us"]
+    assert plan.report["warnings"] == []
+    checked = plan.check()
+    assert checked.ok, checked
+    box_path = plan.trajectory.bodies["box"]
+    assert gap(pose_of(box_path[0]), start) < 1e-9
+    assert gap(pose_of(box_path[-1]), goal) < 2e-3
+    folder = plan.save(tmp_path / "lift")
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"plan.json", "robot.urdf", "trajectory.npz", "trajectory.csv", "scene.html", "plots.png"}
+    assert wb.check(wb.Bundle.read(folder)).ok
+
+
+# ------------------------------------------------------------------------------------- what is recorded
+
+
+@pytest.fixture(scope="module")
+def carried(legarm: wb.Robot) -> wb.Plan:
+    """Stand on six and sway; lift a place off the ground with the arms; put it down; leave it there."""
+    state = legarm.state("manipulate")
+    tip = state.pose("limb1_tip")
+    where = up(tip, 0.03, 0.0, 0.0)
+    box = wb.Body("box", mass=0.5, size=(0.1, 0.1, 0.1), pose=where, com=(0.0, 0.01, 0.0))
+    shelf = wb.Body("shelf", mass=3.0, pose=up(where, 0.0, 0.5, 0.0))
+    keep = [wb.PostureTask(weight=0.1)]
+    limits = [wb.JointLimits(), wb.SupportPolygon(0.02)]
+    hold = {
+        "contacts": on(),
+        "carried": [wb.Carried(box, by="limb1_tip")],
+        "hard": [wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
+        "limits": limits,
+    }
+
+    def to(pose: pin.SE3) -> list[wb.Task]:
+        return [wb.PoseTask("box", wb.MinJerk(wb.AS_IS, pose, 0.4), weight=(50.0, 10.0)), *keep]
+
+    sway = wb.PoseTask("body", wb.MinJerk(wb.AS_IS, up(state.pose("body"), 0.01, 0.0, 0.0), 0.3), weight=10.0)
+    return wb.plan(
+        legarm,
+        wb.Script(
+            wb.Phase("sway", contacts=on(), soft=[sway, *keep], duration=0.3),
+            wb.Phase("lift", soft=to(up(where, 0.0, 0.0, 0.03)), duration=0.4, **hold),
+            wb.Phase("place", soft=to(up(where, 0.0, 0.01, 0.0)), duration=0.405, **hold),
+            wb.Phase(
+                "leave",
+                contacts=on(FOUR[:3]),
+                soft=[wb.PoseTask("limb1_tip", up(tip, 0, 0, 0.02)), *keep],
+                duration=0.2,
+            ),
+            bodies=[shelf],
+        ),
+        start=state,
+        task="carry",
+        parameters={"mass": 0.5},
+    )
+
+
+def test_all_promises_hold_over_several_phases(carried: wb.Plan) -> None:
+    report = carried.check()
+    assert report.ok, report
+
+
+def test_phases_cover_the_time_without_gaps(carried: wb.Plan) -> None:
+    phases, time = carried.bundle.phases, carried.trajectory.time
+    assert [p["name"] for p in phases] == ["sway", "lift", "place", "leave"]
+    edges = [phases[0]["start"], *(p["end"] for p in phases)]
+    assert edges[0] == 0.0
+    assert [p["start"] for p in phases] == edges[:-1]
+    # A duration that is no multiple of dt is rounded up to the next.
+    np.testing.assert_allclose(np.diff(edges), [0.3, 0.4, 0.41, 0.2], atol=1e-12)
+    assert edges[-1] == pytest.approx(time[-1], abs=1e-12)
+    np.testing.assert_allclose(np.diff(time), 0.01, atol=1e-12)
+    expected = np.searchsorted(edges[1:-1], time + 1e-9, side="right")
+    np.testing.assert_array_equal(carried.trajectory.phase, expected)
+
+
+def test_q_is_continuous_and_v_leads_from_each_sample_to_the_next(carried: wb.Plan) -> None:
+    robot, motion = carried.robot, carried.trajectory
+    assert motion.q.shape == (len(motion), robot.model.nq)
+    assert motion.v.shape == (len(motion), robot.model.nv)
+    for k in range(len(motion) - 1):
+        step = pin.difference(robot.model, motion.q[k], motion.q[k + 1])
+        np.testing.assert_allclose(step / 0.01, motion.v[k], atol=1e-9)
+    assert np.abs(np.diff(motion.q, axis=0)).max() < 0.05
+    assert not motion.v[-1].any()
+    assert motion.joint_names == robot.joint_names
+
+
+def test_phases_record_what_they_were_asked(carried: wb.Plan) -> None:
+    sway, lift, place, leave = carried.bundle.phases
+    assert [c["frame"] for c in lift["contacts"]] == list(FOUR)
+    assert [c["frame"] for c in leave["contacts"]] == list(FOUR[:3])
+    assert lift["contacts"][0] == {"frame": "leg3_foot", "friction": 0.7, "normal": [0.0, 0.0, 1.0]}
+    assert sway["margin"] == leave["margin"] == -1e9
+    assert lift["margin"] == place["margin"] == 0.02
+    assert sway["closures"] == leave["closures"] == []
+    assert lift["closures"] == place["closures"] == [{"frame_a": "limb1_tip", "frame_b": "limb2_tip"}]
+    assert sway["carried"] == leave["carried"] == []
+    (item,) = lift["carried"]
+    assert {key: item[key] for key in ("name", "frame", "mass")} == {
+        "name": "box",
+        "frame": "limb1_tip",
+        "mass": 0.5,
+    }
+    assert item["com"] == [0.0, 0.01, 0.0]
+    assert lift["roles"] == {"limb1": "arm", "limb2": "arm"}
+    assert [(t["name"], t["hard"]) for t in lift["tasks"]] == [
+        ("relative(limb2_tip in limb1_tip)", True),
+        ("pose(box)", False),
+        ("posture", False),
+    ]
+    box = lift["tasks"][1]
+    assert 0.0 < box["position"] < 1e-3
+    assert 0.0 < box["orientation"] < 0.02
+    assert box["joints"] is None
+    assert carried.bundle.plan["task"] == "carry"
+    assert carried.bundle.plan["parameters"] == {"mass": 0.5}
+    assert {b["name"]: b["mass"] for b in carried.bundle.plan["bodies"]} == {"box": 0.5, "shelf": 3.0}
+    json.dumps(carried.bundle.phases)
+
+
+def test_worst_errors_are_the_largest_of_the_samples(carried: wb.Plan) -> None:
+    for phase in carried.bundle.phases:
+        rows = (carried.trajectory.time >= phase["start"] - 1e-9) & (
+            carried.trajectory.time < phase["end"] - 1e-9
+        )
+        for task in phase["tasks"]:
+            for part in ("position", "orientation", "joints"):
+                column = carried.trajectory.errors.get(f"{task['name']}.{part}")
+                if task[part] is not None:
+                    assert task[part] >= np.nanmax(column[rows]) - 1e-15
+    assert (
+        carried.report["worst"]["pose(box).position"]
+        >= max(p["tasks"][1]["position"] for p in carried.bundle.phases[1:3]) - 1e-9
+    )
+
+
+def test_a_carried_body_follows_its_holder_and_stays_where_it_is_put(carried: wb.Plan) -> None:
+    motion, phases = carried.trajectory, carried.bundle.phases
+    path = [pose_of(row) for row in motion.bodies["box"]]
+    first, grasp, lower, release = (int(round(p["start"] / 0.01)) for p in phases)
+    assert all(gap(path[k], path[first]) == 0.0 for k in range(first, grasp))
+    in_tip = pose_of(phases[1]["carried"][0]["pose"])
+    for k in range(grasp, release + 1):
+        tip = wb.State(carried.robot.model, motion.q[k]).pose("limb1_tip")
+        assert gap(path[k], tip * in_tip) < 1e-9
+    assert gap(path[lower], path[grasp]) > 0.02
+    assert gap(path[grasp], path[first]) < 1e-9
+    assert gap(in_tip, pose_of(phases[2]["carried"][0]["pose"])) < 1e-9
+    assert all(gap(path[k], path[release]) == 0.0 for k in range(release, len(path)))
+    tips = [wb.State(carried.robot.model, motion.q[k]).pose("limb1_tip") for k in (release, len(path) - 1)]
+    assert gap(*tips) > 5e-3
+    shelf = motion.bodies["shelf"]
+    np.testing.assert_array_equal(shelf, np.tile(shelf[0], (len(path), 1)))
+
+
+def test_the_weight_of_what_is_carried_counts(carried: wb.Plan) -> None:
+    robot, motion = carried.robot, carried.trajectory
+    for k, (com, phase) in enumerate(zip(motion.com, motion.phase, strict=True)):
+        expected = wb.State(robot.model, motion.q[k]).com * robot.total_mass
+        mass = robot.total_mass
+        if phase in (1, 2):
+            expected = expected + 0.5 * pose_of(motion.bodies["box"][k]).act(np.array([0.0, 0.01, 0.0]))
+            mass += 0.5
+        np.testing.assert_allclose(com, expected / mass, atol=1e-9)
+    known = np.isfinite(motion.margin)
+    np.testing.assert_array_equal(known, np.isin(motion.phase, (1, 2)))
+    assert motion.margin[known].min() >= 0.02
+
+
+def test_targets_are_recorded_where_they_are_asked(carried: wb.Plan) -> None:
+    motion = carried.trajectory
+    asked = np.isfinite(motion.targets["pose(box)"]).all(axis=1)
+    np.testing.assert_array_equal(asked, np.isin(motion.phase, (1, 2)))
+    rows = np.flatnonzero(asked)
+    assert (
+        np.linalg.norm(motion.targets["pose(box)"][rows, :3] - motion.bodies["box"][rows, :3], axis=1).max()
+        < 1e-3
+    )
+    assert not any(name.startswith("contact") for name in motion.targets)
+
+
+# ----------------------------------------------------------------------------- a body in a script's details
+
+
+def test_a_body_that_stands_nowhere_is_put_at_its_holder(legarm: wb.Robot) -> None:
+    phase = wb.Phase(
+        "hold", contacts=on(), carried=[wb.Carried(wb.Body("box", mass=0.1), by="limb1_tip")], duration=0.02
+    )
+    plan = wb.plan(legarm, phase, start="manipulate", dt=0.01)
+    assert (
+        gap(pose_of(plan.trajectory.bodies["box"][0]), legarm.state("manipulate").pose("limb1_tip")) < 1e-12
+    )
+
+
+def test_a_grip_that_is_given_is_the_grip(legarm: wb.Robot) -> None:
+    grip = pin.SE3(pin.exp3(np.array([0.1, 0.2, 0.3])), np.array([0.01, 0.02, 0.03]))
+    item = wb.Carried(wb.Body("box", mass=0.1), by="limb1_tip", pose=grip)
+    plan = wb.plan(legarm, wb.Phase("hold", contacts=on(), carried=[item], duration=0.02), start="manipulate")
+    tip = legarm.state("manipulate").pose("limb1_tip")
+    assert gap(pose_of(plan.trajectory.bodies["box"][0]), tip * grip) < 1e-9
+    assert plan.check().ok
+
+
+def test_a_body_passed_on_keeps_its_place(legarm: wb.Robot) -> None:
+    """From one hand to the other: the second takes it as it is."""
+    box = wb.Body("box", mass=0.1, pose=legarm.state("manipulate").pose("limb1_tip"))
+    move = wb.PoseTask("box", wb.MinJerk(wb.AS_IS, up(box.pose, 0.0, 0.0, 0.02), 0.2), weight=20.0)
+    plan = wb.plan(
+        legarm,
+        wb.Script(
+            wb.Phase(
+                "one", contacts=on(), carried=[wb.Carried(box, by="limb1_tip")], soft=[move], duration=0.2
+            ),
+            wb.Phase("two", contacts=on(), carried=[wb.Carried(box, by="limb2_tip")], duration=0.1),
+        ),
+        start="manipulate",
+    )
+    assert plan.check().ok
+    path = plan.trajectory.bodies["box"]
+    assert np.abs(np.diff(path[:, :3], axis=0)).max() < 5e-3
+    assert [p["carried"][0]["frame"] for p in plan.bundle.phases] == ["limb1_tip", "limb2_tip"]
+
+
+def test_a_loop_closed_by_way_of_the_box_is_a_closure_of_its_holder(legarm: wb.Robot) -> None:
+    box = wb.Body("box", mass=0.2)
+    phase = wb.Phase(
+        "hold",
+        contacts=on(),
+        carried=[wb.Carried(box, by="limb1_tip")],
+        hard=[wb.RelativePoseTask("limb2_tip", root="box")],
+        soft=[
+            wb.PoseTask(
+                "box", wb.MinJerk(wb.AS_IS, up(legarm.state("manipulate").pose("limb1_tip"), 0, 0, 0.01), 0.2)
+            )
+        ],
+        duration=0.2,
+    )
+    plan = wb.plan(legarm, phase, start="manipulate")
+    assert plan.bundle.phases[0]["closures"] == [{"frame_a": "limb1_tip", "frame_b": "limb2_tip"}]
+    assert plan.check().ok
+
+
+# -------------------------------------------------------------------------------------- dt and progress
+
+
+@pytest.mark.parametrize(("dt", "ticks"), [(0.007, 43), (0.03, 10), (0.3, 1), (0.5, 1), (0.29, 2)])
+def test_a_tick_that_does_not_divide_the_duration_is_rounded_up(
+    legarm: wb.Robot, dt: float, ticks: int
+) -> None:
+    goal = up(legarm.state("stand").pose("body"), 0.0, 0.002, 0.0)
+    task = wb.PoseTask("body", wb.MinJerk(wb.AS_IS, goal, 0.3), weight=20.0)
+    phases = [wb.Phase(name, contacts=on(), soft=[task], duration=0.3) for name in ("one", "two")]
+    plan = wb.plan(legarm, wb.Script(phases), dt=dt)
+    assert plan.report["ticks"] == 2 * ticks
+    assert [p["end"] for p in plan.bundle.phases] == pytest.approx([ticks * dt, 2 * ticks * dt])
+    np.testing.assert_allclose(plan.trajectory.time, np.arange(2 * ticks + 1) * dt)
+    assert plan.check().ok
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.27, 0.5])
+def test_progress_grows_and_ends_at_one(legarm: wb.Robot, dt: float) -> None:
+    phases = [wb.Phase(name, contacts=on(), duration=0.5) for name in ("one", "two", "three")]
+    seen: list[tuple[float, str]] = []
+    wb.plan(legarm, wb.Script(phases), dt=dt, progress=lambda share, name: seen.append((share, name)))
+    shares = [share for share, _ in seen]
+    assert shares[0] == 0.0
+    assert shares[-1] == 1.0
+    assert all(a < b for a, b in zip(shares, shares[1:], strict=False))
+    assert list(dict.fromkeys(name for _, name in seen)) == ["one", "two", "three", "done"]
+
+
+def test_an_observer_sees_every_sample(legarm: wb.Robot) -> None:
+    phases = [
+        wb.Phase(name, contacts=on(), soft=[wb.PostureTask()], duration=0.05) for name in ("one", "two")
+    ]
+    seen: list[tuple[float, str, np.ndarray]] = []
+    plan = wb.plan(
+        legarm,
+        wb.Script(phases),
+        observe=lambda loop, t: seen.append((t, loop.compiled.phase.name, loop.q.copy())),
+    )
+    np.testing.assert_allclose([t for t, _, _ in seen], plan.trajectory.time, atol=1e-12)
+    np.testing.assert_array_equal([q for _, _, q in seen], plan.trajectory.q)
+    assert [name for _, name, _ in seen] == ["one"] * 5 + ["two"] * 6
+
+
+# --------------------------------------------------------------------------------------- nothing half-done
+
+
+def test_an_interrupt_while_planning_comes_through(legarm: wb.Robot, tmp_path: Path) -> None:
+    def stop(share: float, name: str) -> None:
+        if share > 0.2:
+            raise KeyboardInterrupt
+
+    phase = wb.Phase("stand", contacts=on(), duration=1.0)
+    with pytest.raises(KeyboardInterrupt):
+        wb.plan(legarm, phase, progress=stop).save(tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_while_saving_leaves_nothing_behind(
+    carried: wb.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    kept = tmp_path / "kept"
+    carried.bundle.write(kept)
+    before = {path.name: path.read_bytes() for path in kept.iterdir()}
+    monkeypatch.setattr("wbplan.plots.save", stop)
+    for folder in (tmp_path / "new" / "out", kept):
+        with pytest.raises(KeyboardInterrupt):
+            carried.save(folder)
+    assert {path.name: path.read_bytes() for path in kept.iterdir()} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+
+
+def test_a_folder_that_is_a_file_is_refused(carried: wb.Plan, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(wb.BundleError, match="out: is a file"):
+        carried.save(tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def snapshot(robot: wb.Robot) -> list[Any]:
+    model = robot.model
+    return [
+        model.nq,
+        model.nframes,
+        list(model.names),
+        [frame.name for frame in model.frames],
+        [inertia.toDynamicParameters().tolist() for inertia in model.inertias],
+        [np.array(place.homogeneous).tolist() for place in model.jointPlacements],
+        [np.array(frame.placement.homogeneous).tolist() for frame in model.frames],
+        *(
+            np.array(a).tolist()
+            for a in (model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit)
+        ),
+        dict(robot.feet),
+        {limb: {role: dict(held) for role, held in its.items()} for limb, its in robot.roles.items()},
+    ]
+
+
+@pytest.mark.parametrize("backend", ["proxqp", "placo"])
+def test_planning_changes_nothing_that_the_caller_holds(legarm: wb.Robot, backend: str) -> None:
+    state = legarm.state("manipulate")
+    box = wb.Body("box", mass=0.8, pose=state.pose("limb1_tip"))
+    place = up(box.pose, 0.0, 0.0, 0.02)
+    path = wb.MinJerk(wb.AS_IS, place, 0.2)
+    placed = np.array(box.pose.homogeneous)
+    phase = wb.Phase(
+        "lift",
+        contacts=on(),
+        carried=[wb.Carried(box, by="limb1_tip")],
+        soft=[wb.PoseTask("box", path, weight=20.0), wb.PostureTask(state)],
+        limits=[wb.JointLimits(0.5), wb.SupportPolygon()],
+        driven={"limb2_joint4": wb.MinJerk(wb.AS_IS, 0.3, 0.2)},
+        duration=0.2,
+    )
+    script, parameters = wb.Script(phase), {"mass": 0.8}
+    before, q = snapshot(legarm), np.array(state.q)
+    first = wb.plan(legarm, script, start=state, backend=backend, parameters=parameters)
+    assert snapshot(legarm) == before
+    np.testing.assert_array_equal(state.q, q)
+    np.testing.assert_array_equal(box.pose.homogeneous, placed)
+    assert path.start is wb.AS_IS
+    assert parameters == {"mass": 0.8}
+    again = wb.plan(legarm, script, start=state, backend=backend, parameters=parameters)
+    np.testing.assert_array_equal(first.trajectory.q, again.trajectory.q)
+    parameters["mass"] = 0.0
+    assert first.bundle.plan["parameters"] == {"mass": 0.8}
