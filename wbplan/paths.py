@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import abc
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, final
 
@@ -285,7 +285,7 @@ class Waypoints(Path):
 
     times: tuple[float, ...]
     points: tuple[Value, ...]
-    _at: Callable[[float], Value] | None = field(init=False, repr=False, default=None)
+    spline: _Spline | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         for name in ("times", "points"):
@@ -303,44 +303,52 @@ class Waypoints(Path):
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "points", points)
         if not any(p is AS_IS for p in points):
-            object.__setattr__(self, "_at", _spline(times, points))
+            object.__setattr__(self, "spline", _Spline(times, points))
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`."""
-        if self._at is not None:
+        if self.spline is not None:
             return self
         here = _start(here, self.kind)
         return Waypoints(self.times, tuple(here if p is AS_IS else p for p in self.points))
 
     def at(self, t: float) -> Value:
         """See `Path.at`."""
-        return _blend(AS_IS, AS_IS, t) if self._at is None else self._at(t)
+        return _blend(AS_IS, AS_IS, t) if self.spline is None else self.spline(t)
 
 
-def _spline(times: tuple[float, ...], points: tuple[Value, ...]) -> Callable[[float], Value]:
-    """The clamped cubic spline through points of one kind, as a function of time."""
-    first, end = points[0], times[-1]
-    if isinstance(first, pin.SE3):
-        turns = _rotation_vectors([p.rotation for p in points])
-        rows = np.column_stack([[p.translation for p in points], turns])
-    elif first.shape == (3, 3):
-        rows = _rotation_vectors(points)
-    else:
-        rows = np.array(points)
-    curve = CubicSpline(np.array(times), rows, bc_type="clamped")
-    pieces = [tuple(curve.c[:, i]) for i in range(len(times) - 1)]
+@final
+class _Spline:
+    """The clamped cubic spline through points of one kind.
 
-    def at(t: float) -> Value:
-        t = min(max(t, 0.0), end)
-        piece = min(bisect_right(times, t), len(pieces)) - 1
-        a, b, c, d = pieces[piece]
-        s = t - times[piece]
+    Attributes:
+        first: the first point, in whose tangent space rotations are splined.
+    """
+
+    def __init__(self, times: tuple[float, ...], points: tuple[Value, ...]) -> None:
+        self.first, self._times = points[0], times
+        if isinstance(self.first, pin.SE3):
+            turns = _rotation_vectors([p.rotation for p in points])
+            rows = np.column_stack([[p.translation for p in points], turns])
+        else:
+            rows = _rotation_vectors(points) if self.first.shape == (3, 3) else np.array(points)
+        self._curve = CubicSpline(np.array(times), rows, bc_type="clamped")
+        self._pieces = [tuple(self._curve.c[:, i]) for i in range(len(times) - 1)]
+
+    def rows(self, times: Array) -> Array:
+        """(N, ...) coordinates at times (N,) [s]: of a pose, its origin and its rotation vector."""
+        rows: Array = self._curve(np.clip(times, 0.0, self._times[-1]))
+        return rows
+
+    def __call__(self, t: float) -> Value:
+        t = min(max(t, 0.0), self._times[-1])
+        piece = min(bisect_right(self._times, t), len(self._pieces)) - 1
+        a, b, c, d = self._pieces[piece]
+        s = t - self._times[piece]
         row = ((a * s + b) * s + c) * s + d
-        if isinstance(first, pin.SE3):
-            return pin.SE3(first.rotation @ pin.exp3(row[3:]), row[:3])
-        return first @ pin.exp3(row) if first.shape == (3, 3) else row
-
-    return at
+        if isinstance(self.first, pin.SE3):
+            return pin.SE3(self.first.rotation @ pin.exp3(row[3:]), row[:3])
+        return self.first @ pin.exp3(row) if self.first.shape == (3, 3) else row
 
 
 def _rotation_vectors(rotations: Sequence[Array]) -> Array:

@@ -118,8 +118,10 @@ def plan(
     """
     script = script if isinstance(script, Script) else Script(script)
     dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
-    # The state may be another robot's: then its q has another size.
-    q, roles = np.array(robot.state(start.q if isinstance(start, State) else start).q), None
+    state = start if isinstance(start, State) else robot.state(start)
+    if list(state.model.names) != list(robot.model.names):  # its q may be of the same size
+        raise SpecError(f"start: a state of '{state.model.name}', expected one of '{robot.name}'")
+    q, roles = np.array(state.q), None
     _inside_limits(robot, q)
     started = time.perf_counter()
     recorder = Recorder(robot, script, dt)

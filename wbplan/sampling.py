@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wbplan.paths import Line, MinJerk, Path, Swing, Value
+from wbplan.paths import Line, MinJerk, Path, Swing, Value, Waypoints
 
 Array = NDArray[np.float64]
 Samples = tuple[Array, Array]
@@ -25,6 +25,10 @@ def sample(path: Path, times: Array) -> Samples:
 
     Points of a path of rotations are zero, rotations of a path of points are the identity.
     """
+    return _one_by_one(path, times)
+
+
+def _one_by_one(path: Path, times: Array) -> Samples:
     values = [path.at(float(t)) for t in times]
     points, rotations = np.zeros((len(times), 3)), np.tile(np.eye(3), (len(times), 1, 1))
     for k, value in enumerate(values):
@@ -69,3 +73,13 @@ def _(path: Swing, times: Array) -> Samples:
     points, rotations = _between(path.start, path.goal, s * s * s * (10.0 + s * (6.0 * s - 15.0)))
     points[:, 2] += path.height * (4.0 * s * (1.0 - s)) ** 3
     return points, rotations
+
+
+@sample.register
+def _(path: Waypoints, times: Array) -> Samples:
+    if path.spline is None or np.shape(path.spline.first) == (3, 3):
+        return _one_by_one(path, times)
+    rows, first = path.spline.rows(times), path.spline.first
+    if isinstance(first, pin.SE3):
+        return rows[:, :3], first.rotation @ Rotation.from_rotvec(rows[:, 3:]).as_matrix()
+    return rows, np.tile(np.eye(3), (len(times), 1, 1))

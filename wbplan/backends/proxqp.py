@@ -1,6 +1,7 @@
 """ProxQP on the stack's own matrices: the default backend.
 
 It accepts redundant hard rows, which closed loops make, and its multipliers say what holds the robot back.
+Where the bounds that were active last tick are active again, one linear solve finds the same step.
 """
 
 from __future__ import annotations
@@ -9,10 +10,14 @@ from typing import final
 
 import numpy as np
 import proxsuite
+from numpy.typing import NDArray
 
+from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
 from wbplan.qp import Multipliers, Solution
 from wbplan.stack import UNBOUNDED, Stack
+
+Array = NDArray[np.float64]
 
 
 @final
@@ -23,6 +28,7 @@ class ProxqpBackend:
 
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
+        self._guess = ActiveSetGuess(stack)
         self._qp = self._new_solver()
         self._started = False
         self._unbounded = np.full(len(stack.d), -UNBOUNDED)
@@ -44,17 +50,23 @@ class ProxqpBackend:
         """See `Backend.solve`."""
         s = self._stack
         s.assemble()
-        if not (self._run() or self._retry()):
-            raise solve_error(s, "the QP has no solution")
+        x, multipliers = self._guess.solve(), self._guess.multipliers
+        if x is None:
+            x, multipliers = self._ask_solver()
         step = self._rest.copy()
-        step[s.free] = np.minimum(np.maximum(self._qp.results.x, s.lower), s.upper)
+        step[s.free] = np.minimum(np.maximum(x, s.lower), s.upper)
         if s.driving:
             step[s.driven] = s.driven_step
-        return Solution(step, self._multipliers)
+        return Solution(step, lambda: multipliers)
 
-    def _multipliers(self) -> Multipliers:
-        results, edges = self._qp.results, len(self._stack.d)
-        return Multipliers(np.array(results.y), np.array(results.z[:edges]), np.array(results.z[edges:]))
+    def _ask_solver(self) -> tuple[Array, Multipliers]:
+        s = self._stack
+        if not (self._run() or self._retry()):
+            raise solve_error(s, "the QP has no solution")
+        results, edges = self._qp.results, len(s.d)
+        found = Multipliers(np.array(results.y), np.array(results.z[:edges]), np.array(results.z[edges:]))
+        self._guess.learn(found.box, found.edges)
+        return np.array(results.x), found
 
     def _run(self) -> bool:
         s, qp = self._stack, self._qp
@@ -64,15 +76,11 @@ class ProxqpBackend:
             qp.init(s.H, s.g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
             self._started = True
         qp.solve()
-        return self._good()
+        # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
+        return bool(qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
 
     def _retry(self) -> bool:
         """Once more from nothing, with patience: a warm start may be a bad one."""
         self._qp, self._started = self._new_solver(), False
         self._qp.settings.max_iter = 2000
         return self._run()
-
-    def _good(self) -> bool:
-        """Solved: the solver's own residuals are absolute, in the rows' units, and below `eps_abs`."""
-        status = self._qp.results.info.status
-        return bool(status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
