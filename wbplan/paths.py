@@ -56,19 +56,24 @@ def checked(value: object, what: str) -> Value:
             raise SpecError(f"{what}: the pose holds NaN or infinity:\n{matrix}")
         _check_rotation(matrix[:3, :3], what)
         return pin.SE3(value)
-    try:
-        array = np.array(value)
-    except ValueError:  # lists of different lengths
-        array = np.array(None)
-    if array.dtype.kind not in "biuf":
+    numbers = numeric(value)
+    if numbers is None:
         raise SpecError(f"{what}: expected pin.SE3 or an array of numbers, got {value!r}")
-    numbers = array.astype(np.float64)
     if not np.isfinite(numbers).all():
         raise SpecError(f"{what}: NaN or infinite value in {numbers}")
     if numbers.shape == (3, 3):
         _check_rotation(numbers, what)
     numbers.setflags(write=False)
     return numbers
+
+
+def numeric(value: object) -> Array | None:
+    """A copy as an array; `None` for what is not made of numbers, as text that reads like one."""
+    try:
+        array = np.array(value)
+    except ValueError:  # lists of different lengths
+        return None
+    return array.astype(np.float64) if array.dtype.kind in "biuf" else None
 
 
 def _check_rotation(matrix: Array, what: str) -> None:
@@ -91,14 +96,15 @@ def number(
     value: object, what: str, expected: str, *, least: float = -np.inf, above: float = -np.inf
 ) -> float:
     """A finite number, `least` or more and more than `above`; refused with a `SpecError` if it is not."""
-    try:  # not float(value) at once: that takes "1.0" as well
-        scalar = np.array(value)
-    except ValueError:  # lists of different lengths
-        scalar = np.array(None)
-    if scalar.shape == () and scalar.dtype.kind in "biuf":
-        found = float(scalar)
-        if np.isfinite(found) and found >= least and found > above:
-            return found
+    scalar = numeric(value)
+    if (
+        scalar is not None
+        and scalar.shape == ()
+        and np.isfinite(scalar)
+        and scalar >= least
+        and scalar > above
+    ):
+        return float(scalar)
     raise SpecError(f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}")
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.errors import SpecError, listing
-from wbplan.paths import AS_IS, NUMBER, POINT, POSE, ROTATION, AsIs, Path, as_path, name_of, number
+from wbplan.paths import AS_IS, NUMBER, POINT, POSE, ROTATION, AsIs, Path, as_path, name_of, number, numeric
 from wbplan.state import State
 
 Array = NDArray[np.float64]
@@ -33,15 +33,10 @@ GAIN = 20.0
 def _weights(value: object, count: int, what: str) -> Array:
     """Read-only (count,) weights from one number or `count` of them."""
     expected = "a finite number of 0 or more" + (f", or {count} of them" if count > 1 else "")
-    try:
-        given = np.array(value)
-    except ValueError:  # lists of different lengths
-        given = np.array(None)
-    if given.shape not in ((), (count,)) or given.dtype.kind not in "biuf":
+    given = numeric(value)
+    if given is None or given.shape not in ((), (count,)) or not (np.isfinite(given) & (given >= 0.0)).all():
         raise SpecError(f"{what}: expected {expected}, got {value!r}")
-    weights = np.array(np.broadcast_to(given, (count,)), dtype=np.float64)
-    if not np.isfinite(weights).all() or (weights < 0.0).any():
-        raise SpecError(f"{what}: expected {expected}, got {value!r}")
+    weights = np.array(np.broadcast_to(given, (count,)))
     weights.setflags(write=False)
     return weights
 
