@@ -10,7 +10,7 @@ method on the loop equations from many random starts; each pose comes with how o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from wbplan.errors import SolveError, SpecError, listing
 from wbplan.mechanism.elimination import eliminate
 from wbplan.mechanism.kernels import close_from_many, close_loops
+from wbplan.mechanism.leg import ThreeJointLeg
 from wbplan.mechanism.platform import Platform
-from wbplan.mechanism.solutions import LIMIT_TOLERANCE, wrapped
+from wbplan.mechanism.solutions import LimbSolution, wrapped
 
 Array = NDArray[np.float64]
 
@@ -28,9 +29,9 @@ CLOSED = 1e-11
 """Gap [m] of the loops below which Newton's method has arrived."""
 SAME = 1e-6
 """Poses closer than this [m, or rad times the size of the stance] are one."""
-STARTS = 400
+STARTS = 100
 """Random starts of a round of the multi-start; rounds are added while they find anything new."""
-ROUNDS = 6
+ROUNDS = 12
 DAMPING = 0.3
 
 
@@ -253,7 +254,7 @@ def _multi_start(platform: Platform, known: Mapping[str, float], near: pin.SE3, 
         points = centre + random.uniform(-reach, reach, (STARTS, 3))
         gaps = close_from_many(
             loops.screws, loops.counts, loops.tips, loops.feet, loops.columns, loops.passive, q, rotations,
-            points, 60, CLOSED, DAMPING,
+            points, 40, CLOSED, DAMPING,
         )  # fmt: skip
         starts += STARTS
         before = len(hits)
@@ -303,7 +304,7 @@ def _annotated(
             return None
         inside = [s for s in candidates if any(s is w for w in every.within)]
         if not inside:
-            mine = replace(every, within=()).reason or _outside(leg.joints, candidates, leg.lower, leg.upper)
+            mine = _outside(leg, candidates) if given else every.reason
             reasons.append(f"leg '{name}': {mine}")
         if candidates:
             best = (inside or candidates)[0]
@@ -312,10 +313,11 @@ def _annotated(
     return BodySolution(pose, joints, not reasons, "; ".join(reasons), distance, hits)
 
 
-def _outside(names: Sequence[str], candidates: Sequence[object], lower: Array, upper: Array) -> str:
-    for candidate in candidates:
-        q = np.asarray(candidate.joints)  # type: ignore[attr-defined]
-        worst = int(np.argmax(np.maximum(lower - q, q - upper)))
-        if max(lower[worst] - q[worst], q[worst] - upper[worst]) > LIMIT_TOLERANCE:
-            return f"{names[worst]} would have to be at {q[worst]:.4f} rad"
-    return "no branch with the known joints is within the limits"
+def _outside(leg: ThreeJointLeg, candidates: Sequence[LimbSolution]) -> str:
+    """Which joint is the farthest outside its limits, of the branch that is the nearest to them."""
+    best = min(candidates, key=lambda s: float(np.maximum(leg.lower - s.joints, s.joints - leg.upper).max()))
+    worst = int(np.argmax(np.maximum(leg.lower - best.joints, best.joints - leg.upper)))
+    return (
+        f"{leg.joints[worst]} would have to be at {best.joints[worst]:.4f} rad, its limits are "
+        f"{leg.lower[worst]:.4f} and {leg.upper[worst]:.4f}"
+    )

@@ -43,25 +43,47 @@ def cross(a: Any, b: Any) -> Any:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
+def product(a: Any, b: Any) -> Any:
+    """Product of two (3, 3)."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for k in range(3):
+            out[i, k] = a[i, 0] * b[0, k] + a[i, 1] * b[1, k] + a[i, 2] * b[2, k]
+    return out
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def chain_pose(screws: Any, q: Any) -> Any:
     """Rotation (3, 3) and translation (3,) of the product of exponentials, and the screws (n, 6) at q."""
     rotation, translation = np.eye(3), np.zeros(3)
     at = np.empty((len(q), 6))
+    turned, moved, step, centre = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3)
     for j in range(len(q)):
-        axis, moment = np.ascontiguousarray(screws[j, :3]), np.ascontiguousarray(screws[j, 3:])
-        turned = rotation @ axis
+        s = screws[j]
+        for i in range(3):
+            turned[i] = rotation[i, 0] * s[0] + rotation[i, 1] * s[1] + rotation[i, 2] * s[2]
+            moved[i] = rotation[i, 0] * s[3] + rotation[i, 1] * s[4] + rotation[i, 2] * s[5]
         at[j, :3] = turned
-        at[j, 3:] = rotation @ moment + cross(translation, turned)
-        square = axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2
+        at[j, 3] = moved[0] + translation[1] * turned[2] - translation[2] * turned[1]
+        at[j, 4] = moved[1] + translation[2] * turned[0] - translation[0] * turned[2]
+        at[j, 5] = moved[2] + translation[0] * turned[1] - translation[1] * turned[0]
+        square = s[0] ** 2 + s[1] ** 2 + s[2] ** 2
         if square < 1e-24:
-            step, moved = np.eye(3), moment * q[j]
-        else:
-            step = turn_of(axis * q[j])
-            centre = cross(axis, moment) / square
-            pitch = (axis[0] * moment[0] + axis[1] * moment[1] + axis[2] * moment[2]) / square
-            moved = centre - step @ centre + axis * (pitch * q[j])
-        translation = translation + rotation @ moved
-        rotation = rotation @ step
+            translation += moved * q[j]
+            continue
+        # The turned screw's axis goes through `centre`; everything so far turns about it, and slides by its pitch.
+        w = at[j]
+        centre[0] = (w[1] * w[5] - w[2] * w[4]) / square
+        centre[1] = (w[2] * w[3] - w[0] * w[5]) / square
+        centre[2] = (w[0] * w[4] - w[1] * w[3]) / square
+        pitch = (w[0] * w[3] + w[1] * w[4] + w[2] * w[5]) / square
+        step[:] = turn_of(turned * q[j])
+        arm = translation - centre
+        for i in range(3):
+            translation[i] = centre[i] + pitch * q[j] * turned[i]
+            for k in range(3):
+                translation[i] += step[i, k] * arm[k]
+        rotation = product(step, rotation)
     return rotation, translation, at
 
 
