@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi, radians
 
-from shapes import Part, Triple, block, rod
+from shapes import Part, Triple, block, box, rod, rotation
 
 KGF_CM = 9.80665e-2  # [N m]
 
@@ -42,6 +42,24 @@ def housing(servo: Servo, shaft: Triple, along: str, axis: str, back: bool = Tru
     low[order[along]], high[order[along]] = (-far, near) if back else (-near, far)
     corner = [tuple(s + v for s, v in zip(shaft, side, strict=True)) for side in (low, high)]
     return block(corner[0], corner[1], "servo_black", mass=servo.mass)  # type: ignore[arg-type]
+
+
+def seams(servo: Servo, placed: Part, along: str, axis: str) -> Iterator[Part]:
+    """The seams between a housing's three shells, across its shaft: drawn only.
+
+    Args:
+        servo: what it is.
+        placed: its housing.
+        along: axis of the housing's long side, "x", "y" or "z".
+        axis: axis of its shaft.
+    """
+    long, short, deep = servo.size
+    raised = 0.0006
+    thin = [{along: long + raised, axis: 0.0008}.get(name, short + raised) for name in "xyz"]
+    for share in (-0.22, 0.28):
+        away = rotation(placed.rpy) @ [share * deep if name == axis else 0.0 for name in "xyz"]
+        x, y, z = (float(a + b) for a, b in zip(placed.xyz, away, strict=True))
+        yield Part(box(thin[0], thin[1], thin[2]), (x, y, z), placed.rpy, "servo_seam", 0.0)
 
 
 def horns(at: Triple, axis: str, inner: float, outer: float, radius: float = 0.011) -> Iterator[Part]:

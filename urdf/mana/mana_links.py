@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from math import pi
 
 from mana_table import SIDES, T
-from servos import AX_12A, horns, housing
+from servos import AX_12A, horns, housing, seams
 from shapes import Part, block, box, cylinder, rod, sphere
 from writer import Link
 
@@ -26,7 +26,8 @@ def body() -> Link:
     half = (AX_12A.size[2] / 2, AX_12A.size[0] - AX_12A.shaft)
     for front, left in SIDES.values():
         x, y = front * (T.length / 2 - T.drive), left * T.hip_y
-        parts.append(housing(AX_12A, (x, y, 0.0), "y", "x", left > 0))
+        servo = housing(AX_12A, (x, y, 0.0), "y", "x", left > 0)
+        parts += [servo, *seams(AX_12A, servo, "y", "x")]
         shaft, end = x + front * half[0], front * (T.length / 2 - 0.0195)
         parts.append(rod((shaft, y, 0.0), (end, y, 0.0), 0.011, "servo_horn", mass=0.0))
         for x in (0.076, 0.046):
@@ -93,6 +94,7 @@ def hip(leg: str, inner: float) -> Link:
         plate(T.d - 0.0185, T.d + 0.018, low, -0.014),
         block((-FACE, T.d - 0.018, high), (FACE, T.d + 0.018, high + 0.0025)),
         Part(servo.shape, servo.xyz, material="servo_black", mass=AX_12A.mass, solid=True),
+        *seams(AX_12A, servo, "z", "y"),
         *horns((0.0, T.d, -T.l1), "y", 0.020, 0.0245),
         rod((inner * FACE, 0.0, 0.0), (inner * (FACE - 0.002), 0.0, 0.0), 0.007, "dark_aluminium", mass=0.0),
     ]
@@ -111,11 +113,13 @@ def _fork(reach: float, wide: float) -> Iterator[Part]:
 def thigh(leg: str) -> Link:
     """Fork on hip 2, and servo 3 at the knee, upright."""
     knee = (0.0, 0.0, -T.l2)
-    top = AX_12A.size[0] - AX_12A.shaft - T.l2  # of servo 3
+    servo = housing(AX_12A, knee, "z", "y", back=False)
+    top = AX_12A.size[0] - AX_12A.shaft - T.l2
     parts = [
         *_fork(0.032, 0.011),
         block((-0.011, -0.016, top), (0.011, 0.016, -0.032)),
-        housing(AX_12A, knee, "z", "y", back=False),
+        servo,
+        *seams(AX_12A, servo, "z", "y"),
         *horns(knee, "y", 0.020, 0.0245),
     ]
     covers = (
