@@ -92,9 +92,9 @@ def poses() -> dict[str, dict[str, float]]:
     """The named whole-body poses; the README says why these angles."""
     stand = legs_at(T.crouch, -2 * T.crouch)
     return {
-        "stand": stand | arm_at(0.0, -168.0, 156.0, 0.0, 20.0, 0.0),
+        "stand": stand | arm_at(0.0, -165.0, 145.0, 0.0, 20.0, 0.0),
         "ready": stand | arm_at(0.0, -105.0, 115.0, 0.0, 50.0, 0.0),
-        "crouch": legs_at(65.0, -130.0) | arm_at(0.0, -168.0, 156.0, 0.0, 20.0, 0.0),
+        "crouch": legs_at(58.0, -116.0) | arm_at(0.0, -165.0, 145.0, 0.0, 20.0, 0.0),
     }
 
 

@@ -9,9 +9,11 @@ from hiphant_table import FRONT, LEFT, LEGS, T
 from shapes import ORIGIN, Part, Triple, block, box, cylinder, rod, sphere
 from writer import Link
 
-HULL = 0.135  # half width of the hull between the hips
+HULL = 0.110  # half width of the hull between the hips
 DECK = 0.08  # its top above {B}, where the arm is bolted on
 WING = 0.215  # half length of the wide middle
+DRIVE_Y = 0.115  # axis of the abduction modules, half in the hull: a belt takes them to the joint
+BELT = (0.070, 0.088)  # where the belt runs, along x towards the middle from the hip
 
 
 def module(start: Triple, end: Triple, mass: float | None) -> Iterator[Part]:
@@ -40,13 +42,7 @@ def body() -> Link:
         block((-long, -HULL + 0.01, -0.045), (-long + 0.02, HULL - 0.01, DECK - 0.02), "shell_white"),
     ]
     for leg in LEGS:
-        x, y = FRONT[leg] * T.hip_x, LEFT[leg] * T.hip_y
-        inner = x - FRONT[leg] * (T.module_radius + 0.018 + T.module_length)
-        outer = x - FRONT[leg] * (T.module_radius + 0.018)
-        parts += module((inner, y, 0.0), (outer, y, 0.0), T.module)
-        low, high = sorted((LEFT[leg] * (HULL - 0.005), y))
-        a, b = sorted((inner + FRONT[leg] * 0.01, outer - FRONT[leg] * 0.012))
-        parts.append(block((a, low, -0.035), (b, high, 0.035), "aluminium"))
+        parts += abduction(leg)
     parts += wings(wide)
     parts += sensors(long)
     covers = (
@@ -54,12 +50,32 @@ def body() -> Link:
         block((-WING, -wide, -0.030), (WING, wide, DECK)),
         Part(box(0.10, 0.09, 0.12), (-0.33, 0.0, DECK + 0.06)),
         *(
-            block((x - 0.045, y - T.module_radius, -T.module_radius), (x + 0.045, y + T.module_radius, 0.05))
-            for x in (-0.29, 0.29)
-            for y in (-T.hip_y, T.hip_y)
+            block((x - 0.0515, y - 0.050, -0.050), (x + 0.0515, y + 0.050, 0.050))
+            for x in (-0.2785, 0.2785)
+            for y in (-DRIVE_Y, DRIVE_Y)
         ),
+        *(belt(leg) for leg in LEGS),
     )
     return Link("body", tuple(parts), T.torso - 4 * T.module, covers)
+
+
+def belt(leg: str) -> Part:
+    """The belt's case, from the module to the abduction joint."""
+    x, y = FRONT[leg] * T.hip_x, LEFT[leg] * T.hip_y
+    a, b = sorted(x - FRONT[leg] * near for near in BELT)
+    low, high = sorted((LEFT[leg] * 0.080, y + LEFT[leg] * 0.014))
+    return block((a, low, -0.034), (b, high, 0.034), "aluminium")
+
+
+def abduction(leg: str) -> Iterator[Part]:
+    """Module of joint 1 beside the hull, its belt, and the bearing that carries the hip."""
+    x, y = FRONT[leg] * T.hip_x, LEFT[leg] * T.hip_y
+    inner, outer, end = (x - FRONT[leg] * far for far in (BELT[1] + T.module_length, BELT[1], BELT[1] + 0.03))
+    yield from module((inner, LEFT[leg] * DRIVE_Y, 0.0), (outer, LEFT[leg] * DRIVE_Y, 0.0), T.module)
+    yield belt(leg)
+    yield rod((end, y, 0.0), (outer, y, 0.0), 0.014, "dark_aluminium")
+    pulley = x - FRONT[leg] * (BELT[1] + 0.002)
+    yield rod((outer, y, 0.0), (pulley, y, 0.0), 0.0145, "accent_blue", mass=0.0)
 
 
 def wings(wide: float) -> Iterator[Part]:
@@ -102,7 +118,7 @@ def sensors(long: float) -> Iterator[Part]:
     yield rod((-0.42, 0.07, DECK + 0.018), (-0.42, 0.07, DECK + 0.034), 0.015, "signal_red", mass=0.0)
 
 
-INNER, OUTER = -0.055, -0.022  # faces of the thigh along y, the leg's plane at 0, the body at -
+INNER, OUTER = -0.060, -0.040  # faces of the thigh along y; the shank and its balloon turn past them at 0
 
 
 def hip(leg: str) -> Link:
@@ -142,8 +158,8 @@ def thigh(leg: str) -> Link:
         disc(0.0, 0.054, INNER, OUTER, "shell_white"),
         disc(knee, 0.048, INNER, OUTER, "shell_white"),
         slab(0.022, knee + 0.075, -0.075, OUTER, OUTER + 0.002, "dark_aluminium", mass=0.0),
-        disc(0.0, 0.036, OUTER, OUTER + 0.006, "dark_aluminium", mass=0.0),
-        disc(0.0, 0.026, OUTER + 0.006, OUTER + 0.009, "accent_blue", mass=0.0),
+        disc(0.0, 0.036, OUTER, OUTER + 0.003, "dark_aluminium", mass=0.0),
+        disc(0.0, 0.026, OUTER + 0.003, OUTER + 0.004, "accent_blue", mass=0.0),
         *module((0.0, side * (INNER - T.module_length), knee), (0.0, side * INNER, knee), T.module),
     ]
     low, high = sorted((side * INNER, side * OUTER))
@@ -164,7 +180,7 @@ def shank(leg: str) -> Link:
     lean = radians(T.crouch)  # the shank leans so much; its own "up" is turned by this
     ball = (-T.balloon * sin(lean), 0.0, foot + T.balloon * cos(lean))
     parts = [
-        rod((0.0, side * (OUTER + 0.010), 0.0), (0.0, side * 0.020, 0.0), 0.040, "aluminium"),
+        rod((0.0, side * (OUTER + 0.006), 0.0), (0.0, side * 0.020, 0.0), 0.040, "aluminium"),
         rod((0.0, side * 0.020, 0.0), (0.0, side * 0.026, 0.0), 0.030, "dark_aluminium"),
         rod((0.0, 0.0, -0.020), (0.0, 0.0, -0.085), 0.019, "aluminium"),
         rod((0.0, 0.0, -0.075), (0.0, 0.0, foot + 0.075), 0.0145, "carbon"),
@@ -173,7 +189,7 @@ def shank(leg: str) -> Link:
         rod((0.0, 0.0, foot + 0.058), (ball[0], 0.0, ball[2]), 0.020, "dark_aluminium"),
         Part(sphere(T.balloon), ball, material="balloon", solid=True),
     ]
-    low, high = sorted((side * (OUTER + 0.010), side * 0.026))
+    low, high = sorted((side * (OUTER + 0.006), side * 0.026))
     covers = (
         block((-0.040, low, -0.040), (0.040, high, 0.040)),
         rod((0.0, 0.0, 0.0), (0.0, 0.0, foot + 0.045), 0.019),

@@ -38,7 +38,7 @@ class Table:
     hip_shell: float = 0.15
     thigh_shell: float = 0.30
     shank_shell: float = 0.20  # carbon tube, clamp and balloon
-    balloon: float = 0.035  # radius
+    balloon: float = 0.032  # radius
     module_radius: float = 0.050
     module_length: float = 0.085
     leg_drive: Drive = Drive(80.0, 10.0)  # effort given, speed assumed
@@ -59,7 +59,7 @@ class Table:
         (-180.0, 60.0),
         (-10.0, 165.0),
         (-180.0, 180.0),
-        (-115.0, 115.0),
+        (-110.0, 110.0),
         (-180.0, 180.0),
     )
 
