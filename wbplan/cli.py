@@ -1,4 +1,4 @@
-"""The command line: list, run, check, view, robot.
+"""The command line: list, run, check, view, robot, papers.
 
 Exit codes: 0 done, and every promise holds; 1 planned but a promise is broken, or no plan exists; 2 bad usage
 or bad input, told on stderr without a traceback; 130 interrupted.
@@ -24,6 +24,7 @@ from wbplan.bundle import Bundle, is_bundle
 from wbplan.checks import check as recompute
 from wbplan.errors import BundleError, CheckFailed, SolveError, SpecError, WbplanError
 from wbplan.live import LiveView
+from wbplan.papers import DIFFERS, report, summary
 from wbplan.planner import plan
 from wbplan.printing import print_plan, print_robot
 from wbplan.robot import Robot, load_robot
@@ -193,6 +194,24 @@ def robot(
 ) -> None:
     """Summary of a robot: limbs, frames, mass, limits, and the problems found."""
     print_robot(load_robot(name_or_path), _console())
+
+
+@app.command()
+def papers(
+    paper: Annotated[
+        str | None, typer.Argument(help="mana, zheng, hexpiderix, hiphant or zhuang; all where not given.")
+    ] = None,
+) -> None:
+    """What the papers print about kinematics beside what comes out here; exit code 1 where that differs."""
+    rows = report(paper)
+    _console().print(summary([row.cells() for row in rows]))
+    counts = {
+        verdict: [r.verdict for r in rows].count(verdict) for verdict in sorted({r.verdict for r in rows})
+    }
+    print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    wrong = [f"{r.paper}, {r.table}: {r.what}" for r in rows if r.verdict == DIFFERS]
+    if wrong:
+        raise CheckFailed(f"{len(wrong)} numbers differ from the print: {'; '.join(wrong)}", wrong)
 
 
 def _commands() -> set[str]:

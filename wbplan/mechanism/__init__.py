@@ -1,7 +1,7 @@
 """The legged robot as a serial-parallel mechanism: limbs, the body on its legs, mobility and rates.
 
-Screws are (direction, moment), angular part first, as in the papers (`wbplan.mechanism.screws`); Jacobians have
-linear rows first, as Pinocchio's. Lengths are in metres, angles in radians.
+Screws are (direction, moment), angular part first, as in the papers (`wbplan.mechanism.screws`);
+Jacobians have linear rows first, as Pinocchio's. Lengths are in metres, angles in radians.
 """
 
 from wbplan.mechanism.actuation import ActuatedSet, actuated_sets

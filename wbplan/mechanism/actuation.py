@@ -40,9 +40,7 @@ class ActuatedSet:
         return self.rank == 6
 
 
-def actuated_sets(
-    platform: Platform, joints: Mapping[str, float], count: int = 6
-) -> tuple[ActuatedSet, ...]:
+def actuated_sets(platform: Platform, joints: Mapping[str, float], count: int = 6) -> tuple[ActuatedSet, ...]:
     """Every set of `count` stance joints at a configuration, the best conditioned first.
 
     A set is admissible iff its rows of G (`Platform.rates_map`) have rank 6.

@@ -1,4 +1,4 @@
-"""Forward displacement by elimination: every root of one polynomial for each foot position of the second leg."""
+"""Forward displacement by elimination: all roots of one polynomial for each place of the second foot."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def eliminate(platform: Platform, known: Mapping[str, float]) -> tuple[list[pin.
     ):
         degree += 2 * height
         place = _third_foot(b1, b2, world)
-        for phi in _real_angles(lambda angle, place=place: equation(place(angle)), height):
+        for phi in _real_angles(equation, place, height):
             body = foot_plane(b1, b2, place(np.array([phi]))[0])
             poses.append(foot_plane(*world) * body.inverse())
     return poses, degree
@@ -58,7 +58,7 @@ def _pattern(platform: Platform, known: Mapping[str, float]) -> tuple[str, str, 
     if len(used) != 3 or sum(used.values()) != len(known):
         return None
     for first, second, third in _orders(list(used)):
-        a, b, c = (platform.chains[n] for n in (first, second, third))
+        a, b = platform.chains[first], platform.chains[second]
         if (
             used[first] == len(a.joints)
             and used[second] == len(b.joints) - 1
@@ -84,8 +84,10 @@ def _values(chain: Chain, known: Mapping[str, float]) -> Array:
     return np.array([known[j] for j in chain.joints], dtype=np.float64)
 
 
-def _circle_meets_sphere(chain: Chain, known: Mapping[str, float], centre: Array, radius: float) -> list[Array]:
-    """Where the foot of a leg with one unknown turn is at a distance from a point: none, one or two places."""
+def _circle_meets_sphere(
+    chain: Chain, known: Mapping[str, float], centre: Array, radius: float
+) -> list[Array]:
+    """Where the foot of a leg with one unknown turn is at a distance from a point: two places at most."""
     rest = chain.hold({j: v for j, v in known.items() if j in chain.joints})
     axis, moment = rest.screws[0, :3], rest.screws[0, 3:]
     foot = rest.home.translation
@@ -106,7 +108,7 @@ def _circle_meets_sphere(chain: Chain, known: Mapping[str, float], centre: Array
 
 
 def _third_foot(b1: Array, b2: Array, world: list[Array]) -> Callable[[Array], Array]:
-    """phi (S,) -> third foot (S, 3) in the body, going round the line through the first two."""
+    """Angles phi (S,) -> third foot (S, 3) in the body, going round the line through the first two."""
     along = (world[1] - world[0]) / np.linalg.norm(world[1] - world[0])
     span = world[2] - world[0]
     axial = float(along @ span)
@@ -126,7 +128,7 @@ def _third_foot(b1: Array, b2: Array, world: list[Array]) -> Callable[[Array], A
 def _equation(leg: ThreeJointLeg, joint: int, value: float) -> Callable[[Array], Array]:
     """Feet (S, 3) in the body -> (S,), zero where the leg's one known joint has its value, for either rho.
 
-    With the foot (x, y, z) in the leg's frame, h = up z, rho^2 = x^2 + y^2 - offset^2 and G = rho^2 + h^2 + ...:
+    With the foot (x, y, z) in the leg's frame, h = up z, rho^2 = x^2 + y^2 - offset^2 and G = rho^2 + h^2 ...:
     joint 1: y cos q1 - x sin q1 = offset; joint 2: (rho - l1 - l2 c2)^2 + (h - l2 s2)^2 = l3^2;
     joint 3: (rho - l1)^2 + h^2 = l2^2 + l3^2 + 2 l2 l3 c3. The last two are G - k rho = 0, taken as
     G^2 - k^2 rho^2 = 0.
@@ -150,8 +152,14 @@ def _equation(leg: ThreeJointLeg, joint: int, value: float) -> Callable[[Array],
     return equation
 
 
-def _real_angles(function: Callable[[Array], Array], height: int) -> list[float]:
+def _real_angles(
+    equation: Callable[[Array], Array], place: Callable[[Array], Array], height: int
+) -> list[float]:
     """Real zeros of a trigonometric polynomial of a known degree: roots in e^(i phi) on the unit circle."""
+
+    def function(angle: Array) -> Array:
+        return equation(place(angle))
+
     phi = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     laurent = np.fft.fft(function(phi)) / SAMPLES
     coefficients = np.concatenate([laurent[height:0:-1], laurent[:1], laurent[: -height - 1 : -1]])

@@ -2,7 +2,7 @@
 
 Two ways. **Elimination**, where one leg's joints are all known, a second's all but one, and a third's one:
 the first fixes its foot in the body, the second's foot is where a circle meets a sphere, and the third's goes
-round the line through both; its one known joint is then a polynomial of degree 4 (2 for joint 1) in e^(i phi).
+round the line through both; its one known joint is a polynomial of degree 4 (joint 1: 2) in e^(i phi).
 All roots of it are found, so the list of poses is complete. **Multi-start**, for every other set: Newton's
 method on the loop equations from many random starts; each pose comes with how often it was hit.
 """
@@ -224,7 +224,18 @@ class Follower:
             q[place] = value
         k = self._loops
         gap, _ = close_loops(
-            k.screws, k.counts, k.tips, k.feet, k.columns, k.passive, q, rotation, position, 30, 1e-12, DAMPING
+            k.screws,
+            k.counts,
+            k.tips,
+            k.feet,
+            k.columns,
+            k.passive,
+            q,
+            rotation,
+            position,
+            30,
+            1e-12,
+            DAMPING,
         )
         if not gap < CLOSED:
             raise SolveError(
@@ -234,7 +245,9 @@ class Follower:
         return self.pose
 
 
-def _multi_start(platform: Platform, known: Mapping[str, float], near: pin.SE3, seed: int) -> ForwardSolutions:
+def _multi_start(
+    platform: Platform, known: Mapping[str, float], near: pin.SE3, seed: int
+) -> ForwardSolutions:
     loops = Loops(platform, list(known))
     rows, unknowns = 3 * len(loops.names), 6 + loops.passive
     if rows < unknowns:
@@ -250,7 +263,9 @@ def _multi_start(platform: Platform, known: Mapping[str, float], near: pin.SE3, 
     starts = 0
     for _ in range(ROUNDS):
         q = np.where(loops.columns >= 0, random.uniform(-np.pi, np.pi, (STARTS, *given.shape)), given)
-        rotations = np.array([pin.Quaternion(_unit(v)).toRotationMatrix() for v in random.normal(size=(STARTS, 4))])
+        rotations = np.array(
+            [pin.Quaternion(_unit(v)).toRotationMatrix() for v in random.normal(size=(STARTS, 4))]
+        )
         points = centre + random.uniform(-reach, reach, (STARTS, 3))
         gaps = close_from_many(
             loops.screws, loops.counts, loops.tips, loops.feet, loops.columns, loops.passive, q, rotations,
@@ -289,7 +304,7 @@ def _unique(platform: Platform, poses: Sequence[pin.SE3]) -> list[pin.SE3]:
 def _annotated(
     platform: Platform, known: Mapping[str, float], pose: pin.SE3, near: pin.SE3, hits: int
 ) -> BodySolution | None:
-    """The pose with all joints; None where no branch of a leg has the known positions (a root of the square)."""
+    """The pose with all joints; None where no branch of a leg has the known positions (a squared root)."""
     joints: dict[str, float] = {}
     reasons: list[str] = []
     for name, leg in platform.legs.items():

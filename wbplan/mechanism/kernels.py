@@ -71,7 +71,7 @@ def chain_pose(screws: Any, q: Any) -> Any:
         if square < 1e-24:
             translation += moved * q[j]
             continue
-        # The turned screw's axis goes through `centre`; everything so far turns about it, and slides by its pitch.
+        # The turned screw's axis goes through `centre`; all so far turns about it, and slides by its pitch.
         w = at[j]
         centre[0] = (w[1] * w[5] - w[2] * w[4]) / square
         centre[1] = (w[2] * w[3] - w[0] * w[5]) / square
@@ -92,7 +92,7 @@ def loop_equations(
     screws: Any, counts: Any, tips: Any, feet: Any, columns: Any, q: Any, rotation: Any, position: Any,
     residual: Any, jacobian: Any,
 ) -> None:  # fmt: skip
-    """Fills residual (3L,) [m] and jacobian (3L, 6 + passive joints); columns[i, j] < 0 where q[i, j] is given."""
+    """Fills residual (3L,) [m] and jacobian (3L, 6 + passive joints); columns < 0 where q is given."""
     jacobian[:] = 0.0
     for i in range(len(counts)):
         n = counts[i]
@@ -116,7 +116,7 @@ def close_loops(
     screws: Any, counts: Any, tips: Any, feet: Any, columns: Any, passive: Any, q: Any, rotation: Any,
     position: Any, iterations: Any, tolerance: Any, damping: Any,
 ) -> Any:  # fmt: skip
-    """Damped Gauss-Newton from where q, rotation and position are; writes them; (largest residual [m], steps)."""
+    """Damped Gauss-Newton from where q, rotation and position are; returns (worst residual [m], steps)."""
     rows, unknowns = 3 * len(counts), 6 + passive
     residual, jacobian = np.empty(rows), np.empty((rows, unknowns))
     worst = 0.0

@@ -1,4 +1,4 @@
-"""The three-joint leg in closed form: MANA's, Zhuang's, Hex-Piderix's and the leg-arm hexapod's are one geometry.
+"""The three-joint leg in closed form: one geometry for MANA's, Zhuang's, Hex-Piderix's and others.
 
 Joint 1 turns about an axis, joints 2 and 3 about two parallel axes across it. In the leg's own frame (z along
 axis 1, x radial through joint 2 at zero) with a = l1 + l2 cos q2 + l3 cos(q2 + q3):
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 EDGE = 1e-12
 """How far the cosine of the knee may be beyond 1 by rounding."""
 PARALLEL = 1e-8
-"""How far joint axes may be from parallel, or square, to count as such (their directions are unit vectors)."""
+"""How far joint axes may be from parallel, or square, to count as such (as unit vectors)."""
 
 
 def _full_turn(sign: float) -> Array:
@@ -79,7 +79,8 @@ class ThreeJointLeg:
         """Every set of joint positions that puts the foot at a point.
 
         rho = +-sqrt(x^2 + y^2 - offset^2), q1 = atan2(y, x) - atan2(offset, rho), u = rho - l1,
-        q3 = +-acos((u^2 + h^2 - l2^2 - l3^2) / (2 l2 l3)), q2 = atan2(h, u) - atan2(l3 sin q3, l2 + l3 cos q3).
+        q3 = +-acos((u^2 + h^2 - l2^2 - l3^2) / (2 l2 l3)),
+        q2 = atan2(h, u) - atan2(l3 sin q3, l2 + l3 cos q3).
 
         Args:
             foot: (3,) [m] in the body's frame.
@@ -134,7 +135,7 @@ class ThreeJointLeg:
 
     def chain(self) -> Chain:
         """The same leg as a product of exponentials."""
-        one, two, three = self.zeros
+        one, two = self.zeros[:2]
         radial = np.array([math.cos(one), math.sin(one), 0.0])
         across = np.array([-math.sin(one), math.cos(one), 0.0])
         high = np.array([0.0, 0.0, self.up])
@@ -205,7 +206,8 @@ def _require_shape(chain: Chain) -> None:
     one, two, three = chain.screws[:, :3]
     if abs(float(one @ two)) > PARALLEL or float(np.linalg.norm(np.cross(two, three))) > PARALLEL:
         raise SpecError(
-            f"three-joint leg {', '.join(chain.joints)}: expected joints 2 and 3 parallel and square to joint 1, "
+            f"three-joint leg {', '.join(chain.joints)}: expected joints 2 and 3 parallel and square to "
+            f"joint 1, "
             f"found axes {_show(one)}, {_show(two)}, {_show(three)}"
         )
 

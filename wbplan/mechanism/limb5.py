@@ -114,7 +114,9 @@ class FiveJointLimb:
                 a = (x * math.cos(travel) + y * math.sin(travel)) / cosine
                 if abs(shift) > most:
                     cases.append("2.2")
-                    reasons.append(f"the body would have to shift by {shift:.4f} m, at most {most:.4f} m allowed")
+                    reasons.append(
+                        f"the body would have to shift by {shift:.4f} m, at most {most:.4f} m allowed"
+                    )
                     continue
                 cases.append("2.3")
                 found += self._planar(one, qx, five, a, b, shift)
@@ -139,7 +141,9 @@ class FiveJointLimb:
         n = np.array([math.sin(travel), -math.cos(travel)])
         wide = self._radii(b, qx)
         if not wide:
-            reason = f"joint 4 would be {abs(b):.4f} m below joint 2, beyond the reach of {self.reach[1]:.4f} m"
+            reason = (
+                f"joint 4 would be {abs(b):.4f} m below joint 2, beyond the reach of {self.reach[1]:.4f} m"
+            )
             return self._sorted([], "1.1", reason)
         along, square = float(n @ [x, y]), x * x + y * y
         # |(x, y) - s n| = radius: s^2 - 2 (n . xy) s + xy . xy - radius^2 = 0
@@ -164,7 +168,9 @@ class FiveJointLimb:
             if result.within:
                 return result
         if seen:
-            found_at_all = self._sorted([], "1.2", "every shift that brings the tip into reach breaks a joint limit")
+            found_at_all = self._sorted(
+                [], "1.2", "every shift that brings the tip into reach breaks a joint limit"
+            )
             return found_at_all
         possible = min((abs(s) for s in roots), default=math.inf)
         if math.isfinite(possible):
@@ -216,7 +222,7 @@ class FiveJointLimb:
     def _first(
         self, one: float, qx: float, five: float, b: float, options: Iterable[tuple[float, float]]
     ) -> list[LimbSolution]:
-        """Solutions of the smallest shift that has one within limits, else of the smallest that is in reach."""
+        """Solutions of the smallest shift that has one within limits, else of the smallest in reach."""
         fallback: list[LimbSolution] = []
         for shift, a in options:
             found = self._planar(one, qx, five, a, b, shift)
@@ -264,8 +270,13 @@ class FiveJointLimb:
             points = [np.cross(s[:3], s[3:]) for s in chain.screws]
             origin = points[0] + z * float(z @ (tip - points[0]))
             at = np.array([float(x @ (p - origin)) for p in (*points, tip)])
+            l1, l2, l31, l4, l5 = np.diff(at).tolist()
             limb = cls(
-                *(float(d) for d in np.diff(at)),
+                l1,
+                l2,
+                l31,
+                l4,
+                l5,
                 pin.SE3(np.column_stack([x, y, z]), origin),
                 chain.lower,
                 chain.upper,
@@ -275,6 +286,7 @@ class FiveJointLimb:
             if np.allclose(own.screws, chain.screws, atol=1e-8) and own.home.isApprox(chain.home, 1e-8):
                 return limb
         raise SpecError(
-            f"five-joint limb: expected axes z, y, y, y, z and the limb straight along x at zero, found joints "
+            f"five-joint limb: expected axes z, y, y, y, z and the limb straight along x at zero, found "
+            f"joints "
             f"{', '.join(chain.joints)} with axes {chain.screws[:, :3].round(4).tolist()}"
         )

@@ -1,4 +1,4 @@
-"""Degrees of freedom by screws: constraint wrenches, common and redundant constraints, one loop's finite motion."""
+"""Degrees of freedom by screws: constraint wrenches, common and redundant ones, a loop's finite motion."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def mobility(branches: Sequence[ArrayLike]) -> Mobility:
     """Mobility of branches that join a base to one platform, from their joint screws.
 
     Args:
-        branches: for each the screws (n_i, 6) of its one-freedom joints, all in one frame; lengths in a unit in
-            which they are about 1 keep the ranks clear of rounding.
+        branches: for each the screws (n_i, 6) of its one-freedom joints, all in one frame; lengths in a
+            unit in which they are about 1 keep the ranks clear of rounding.
 
     Raises:
         SpecError: fewer than two branches.
@@ -142,7 +142,7 @@ class ClampLoop:
         return np.concatenate([error[3:], error[:3]])
 
     def departure(self, q: ArrayLike, direction: ArrayLike, step: float) -> float:
-        """How far a rate is from being the start of a finite motion: distance to the closed set over the step.
+        """How far a rate is from starting a finite motion: distance to the closed set over the step.
 
         It goes to zero with the step for a rate that can be followed, and to a constant for one that the
         loop's first-order equations allow but its higher orders forbid.

@@ -49,7 +49,9 @@ class Platform:
         frozen = {name: np.array(self.feet[name], dtype=np.float64) for name in self.chains}
         for name, foot in frozen.items():
             if foot.shape != (3,) or not np.isfinite(foot).all():
-                raise SpecError(f"platform: foot of '{name}': expected three finite numbers [m], found {foot}")
+                raise SpecError(
+                    f"platform: foot of '{name}': expected three finite numbers [m], found {foot}"
+                )
         object.__setattr__(self, "chains", MappingProxyType(dict(self.chains)))
         object.__setattr__(self, "feet", MappingProxyType(frozen))
 
@@ -88,7 +90,8 @@ class Platform:
         for limb in chosen:
             if limb not in robot.feet:
                 raise SpecError(
-                    f"robot '{robot.name}': limb {limb!r} has no foot; those that have: {listing(list(robot.feet))}"
+                    f"robot '{robot.name}': limb {limb!r} has no foot; those that have: "
+                    f"{listing(list(robot.feet))}"
                 )
             chain = chain_to(robot, robot.feet[limb])
             role = robot.role_of(limb, state.q)
@@ -126,7 +129,8 @@ class Platform:
         without = [name for name in self.chains if name not in self.legs]
         if without:
             raise SpecError(
-                f"platform: leg '{without[0]}' with joints {', '.join(self.chains[without[0]].joints)} has no "
+                f"platform: leg '{without[0]}' with joints {', '.join(self.chains[without[0]].joints)} has "
+                "no "
                 "closed form; expected three joints, the last two parallel and square to the first"
             )
         return {name: leg.solve(body.actInv(self.feet[name])) for name, leg in self.legs.items()}
@@ -189,7 +193,7 @@ class Platform:
 
 
 def fit(here: Array, there: Array) -> pin.SE3:
-    """The pose T that takes points (P, 3) [m] closest to others: least squares, by the SVD of their covariance."""
+    """The pose T that takes points (P, 3) [m] closest to others: least squares, by an SVD."""
     a, b = here.mean(axis=0), there.mean(axis=0)
     u, _, vt = np.linalg.svd((here - a).T @ (there - b))
     turn = vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T

@@ -44,7 +44,7 @@ class Chain:
         return pin.SE3(rotation, translation) * self.home
 
     def screws_at(self, q: ArrayLike) -> Array:
-        """(n, 6) joint screws at q, in the body's frame: row j is the tip's twist for a unit rate of joint j."""
+        """(n, 6) joint screws at q, in the body's frame: row j: the tip's twist for a unit rate of joint j."""
         return np.asarray(chain_pose(self.screws, self._checked(q))[2], dtype=np.float64)
 
     def point_jacobian(self, q: ArrayLike) -> Array:
@@ -86,7 +86,8 @@ class Chain:
         values = np.asarray(q, dtype=np.float64)
         if values.shape != (len(self.joints),) or not np.isfinite(values).all():
             raise SpecError(
-                f"expected {len(self.joints)} finite joint positions ({', '.join(self.joints)}), found {values}"
+                f"expected {len(self.joints)} finite joint positions ({', '.join(self.joints)}), "
+                f"found {values}"
             )
         return values
 
@@ -107,7 +108,8 @@ def chain_to(robot: Robot, frame: str) -> Chain:
     for j in support:
         if model.nvs[j] != 1:
             raise SpecError(
-                f"robot '{robot.name}': joint '{model.names[j]}' has {model.nvs[j]} degrees of freedom, expected 1"
+                f"robot '{robot.name}': joint '{model.names[j]}' has {model.nvs[j]} degrees of "
+                f"freedom, expected 1"
             )
     data = model.createData()
     zero = pin.neutral(model)
@@ -151,7 +153,7 @@ def positions(robot: Robot, joints: Sequence[str], q: ArrayLike) -> Array:
 
 
 def _limits(model: pin.Model, joints: Sequence[int]) -> tuple[Array, Array]:
-    """Position limits; none (infinite) of a continuous joint, whose two numbers in q are a cosine and a sine."""
+    """Position limits; none (infinite) of a continuous joint, whose numbers in q are a cosine and a sine."""
     lower, upper = np.full(len(joints), -np.inf), np.full(len(joints), np.inf)
     for i, j in enumerate(joints):
         if model.nqs[j] == 1:

@@ -1,13 +1,13 @@
 """Velocity and acceleration of the body from the actuated joints alone, by reciprocal screws.
 
-A stance leg is a chain from the ground to the body: passive joints of the foot first, then tibia, femur, coxa.
+A stance leg is a chain from the ground to the body: the foot's passive joints, then tibia, femur, coxa.
 With the joint screws $ of all of them in one frame, in that order, and V = (omega; v_O) the body's twist,
 
     V = sum_j Omega_j $_j,        A = (alpha; a_O - omega x v_O) = sum_j dOmega_j $_j + L,
     L = sum_{j<k} [Omega_j $_j, Omega_k $_k]
 
-A wrench w that is reciprocal to the passive screws leaves {w; V} = sum_active {w; $_j} q'_j, in which only the
-actuated rates appear; {w; A} likewise, but for {w; L}, which needs the passive rates too.
+A wrench w that is reciprocal to the passive screws leaves {w; V} = sum_active {w; $_j} q'_j, in which only
+the actuated rates appear; {w; A} likewise, but for {w; L}, which needs the passive rates too.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class StanceLeg:
 
     Attributes:
         passive: (p, 6) of the foot's passive joints, in order.
-        active: (a, 6) of the leg's joints, **coxa first**; signs are the robot's: a positive rate of a robot's
+        active: (a, 6) of the leg's joints, **coxa first**; signs are the robot's: a positive rate of its
             joint moves the foot against the body, so the body against the foot by the negative screw.
         wrenches: (w, 6) reciprocal to all passive screws.
     """
@@ -62,7 +62,7 @@ class StanceLeg:
         return np.array(rows)
 
     def passive_rates(self, twist: ArrayLike, rates: ArrayLike) -> Array:
-        """(p,) rates of the foot's passive joints: least squares of V = sum Omega $ with the actuated ones known.
+        """(p,) rates of the foot's passive joints: least squares of V = sum Omega $, the others known.
 
         Args:
             twist: (6,) V.
@@ -83,7 +83,7 @@ class StanceLeg:
 
 
 def point_leg(chain: Chain, q: ArrayLike, body: pin.SE3) -> StanceLeg:
-    """A leg on a foot that turns freely about a fixed point: three rotations about the world's axes (HIphanT).
+    """A leg on a foot that turns freely about a fixed point: rotations about the world's axes (HIphanT).
 
     Args:
         chain: body to foot.
@@ -99,9 +99,9 @@ def point_leg(chain: Chain, q: ArrayLike, body: pin.SE3) -> StanceLeg:
 def cup_leg(chain: Chain, q: ArrayLike, body: pin.SE3, slides: ArrayLike, torsion: bool = True) -> StanceLeg:
     """A leg on a suction cup, a universal and a prismatic joint (Hex-Piderix): it gives along one direction.
 
-    k is the knee's axis and u the direction of the slide. Wrenches are 1$2, the force along k, and $r, the force
-    along u x k, both through the foot. The printed leg (without `torsion`) has six screws of rank 5 where u is
-    in the leg's plane: u x k is then square to it, and k, the slide, tibia and femur are of one planar group.
+    k is the knee's axis and u the direction of the slide. Wrenches are 1$2, the force along k, and $r, the
+    force along u x k, both through the foot. The printed leg (without `torsion`) has six screws of rank 5 where u
+    is in the leg's plane: u x k is then square to it, and k, the slide, tibia and femur are of one planar group.
 
     Args:
         chain: body to foot, joints coxa, femur, tibia.
@@ -122,9 +122,7 @@ def cup_leg(chain: Chain, q: ArrayLike, body: pin.SE3, slides: ArrayLike, torsio
     across = np.cross(u, k)
     turns = [line(across, foot), line(k, foot)]
     turns += [line(u, foot)] if torsion else []
-    return StanceLeg(
-        np.array([*turns, slide(u)]), active, np.array([line(k, foot), line(across, foot)])
-    )
+    return StanceLeg(np.array([*turns, slide(u)]), active, np.array([line(k, foot), line(across, foot)]))
 
 
 def body_twist(legs: Sequence[StanceLeg], rates: Sequence[ArrayLike]) -> Array:
@@ -189,7 +187,9 @@ def wrench_matrix(legs: Sequence[StanceLeg]) -> Array:
 def _solve(legs: Sequence[StanceLeg], own: Sequence[Array]) -> Array:
     matrix = swap(wrench_matrix(legs).T)
     if rank(matrix) < 6:
-        raise SpecError(f"the legs' {len(matrix)} wrenches have rank {rank(matrix)}; six are needed for the body")
+        raise SpecError(
+            f"the legs' {len(matrix)} wrenches have rank {rank(matrix)}; six are needed for the body"
+        )
     right = np.concatenate([swap(leg.wrenches) @ v for leg, v in zip(legs, own, strict=True)])
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-13)[0])
 

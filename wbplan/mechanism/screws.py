@@ -56,9 +56,7 @@ def klein(first: ArrayLike, second: ArrayLike) -> float:
 def lie(first: ArrayLike, second: ArrayLike) -> Array:
     """Lie product [a b] = (s_a x s_b, s_a x m_b - s_b x m_a)."""
     a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    return np.concatenate(
-        [np.cross(a[:3], b[:3]), np.cross(a[:3], b[3:]) - np.cross(b[:3], a[3:])]
-    )
+    return np.concatenate([np.cross(a[:3], b[:3]), np.cross(a[:3], b[3:]) - np.cross(b[:3], a[3:])])
 
 
 def adjoint(rotation: ArrayLike, translation: ArrayLike) -> Array:

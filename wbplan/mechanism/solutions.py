@@ -71,7 +71,12 @@ def wrapped(angle: float) -> float:
 
 
 def sort_by_limits(
-    found: Sequence[LimbSolution], lower: Array, upper: Array, names: Sequence[str], reason: str, case: str = ""
+    found: Sequence[LimbSolution],
+    lower: Array,
+    upper: Array,
+    names: Sequence[str],
+    reason: str,
+    case: str = "",
 ) -> LimbSolutions:
     """Solutions with each angle turned by whole turns into its limits, every way that fits.
 
@@ -121,7 +126,7 @@ def distinct(found: Sequence[LimbSolution], tolerance: float = 1e-9) -> list[Lim
 
 
 def _turns(angle: float, lower: float, upper: float) -> list[float]:
-    """All angles equal to this one, modulo a turn, inside the limits; the wrapped one where there are none."""
+    """All angles equal to this one, modulo a turn, in the limits; the wrapped one where there are none."""
     base = wrapped(float(angle))
     if not (math.isfinite(lower) and math.isfinite(upper)):
         return [base] if lower - LIMIT_TOLERANCE <= base <= upper + LIMIT_TOLERANCE else []
@@ -136,6 +141,4 @@ def _closest(angle: float, lower: float, upper: float) -> float:
     if fitting:
         return fitting[0]
     base = wrapped(float(angle))
-    return min(
-        (base + 2.0 * math.pi * k for k in (-1, 0, 1)), key=lambda a: max(lower - a, a - upper)
-    )
+    return min((base + 2.0 * math.pi * k for k in (-1, 0, 1)), key=lambda a: max(lower - a, a - upper))

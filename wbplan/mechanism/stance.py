@@ -1,4 +1,4 @@
-"""The plane of the feet: the body's pose from three feet, and an arm's tip moved through the legs (HIphanT)."""
+"""The plane of the feet: the body's pose from three feet, and an arm's tip moved by the legs (HIphanT)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def body_pose(feet_world: ArrayLike, feet_body: ArrayLike) -> pin.SE3:
 
 
 def whole_body_jacobian(body: pin.SE3, tip: ArrayLike, arm: ArrayLike) -> Array:
-    """(6, 6 + n) Jacobian of an arm's tip over body translation, body rotation and arm joints (HIphanT eq. 34).
+    """(6, 6 + n) Jacobian of an arm's tip over body translation, rotation and arm joints (HIphanT eq. 34).
 
     J = [[I, -[r]x, R J_v], [0, I, R J_w]] with r = R tip, in the world's axes, linear rows first.
 

@@ -1,26 +1,24 @@
-"""MANA (a quadruped as a 4-SRRR parallel manipulator): tables 1 to 9 and the motions of section 5.3."""
+"""MANA (a quadruped as a 4-SRRR parallel manipulator): tables 1 to 4, and the stance they are about."""
 
 from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wbplan.errors import SolveError
-from wbplan.mechanism import Follower, Platform, ThreeJointLeg, actuated_sets, forward, rank, reciprocal
+from wbplan.mechanism import Platform, ThreeJointLeg, actuated_sets, rank, reciprocal
 from wbplan.mechanism.rates import point_leg
 from wbplan.papers.rows import Row
 from wbplan.robot import load_robot
 
 Array = NDArray[np.float64]
 
-PAPER = "MANA"
+row = partial(Row, "MANA")
 LEGS = ("leg1", "leg2", "leg3", "leg4")
 JOINTS = ("hip1", "hip2", "knee")
 #: Table 4 and Table 6 [rad], legs 1 to 4; Table 5: roll, pitch, yaw [rad] and translation [m].
@@ -32,15 +30,6 @@ TABLE_6 = (
     (-0.18813, -0.99065, 1.4017),
 )
 TABLE_5 = (15.0, 10.0, 15.0, 20.0, 20.0, -20.0)
-TABLE_7 = (15.030, 10.354, 15.068, 20.071, 19.774, -19.830)
-#: Table 8, solutions 1 to 4 (5 to 8 are the same ones): degrees and mm, world.
-TABLE_8 = (
-    (-8.6092, -53.5960, 25.437, -48.030, 20.001, -26.594),
-    (-13.7780, -59.0860, 29.745, -44.272, 20.001, -42.933),
-    (10.7380, -6.0426, 14.854, -13.585, 20.001, 100.314),
-    (15.0020, 10.0010, 15.003, 20.005, 20.001, 130.004),
-)
-TABLE_8_PAIRS = ((1, 8), (2, 5), (3, 6), (4, 7))
 #: Table 3, joints of legs 1 to 4; "x" stands for "3(2)".
 TABLE_3 = (
     ("123", "x", "", "1x"),
@@ -51,20 +40,27 @@ TABLE_3 = (
     ("23", "23", "1", "x"),
     ("23", "1x", "1", "x"),
 )
-#: Length of one step of the search for a limit of the workspace, and how often it is halved.
-COARSE, HALVINGS = 0.005, 40
 
 
 @lru_cache(maxsize=1)
 def stance() -> tuple[Platform, Mapping[str, float]]:
     """MANA on its four feet in the pose of Table 4, feet at (+-105, +-80) mm on z = 0, and its joints."""
     robot = load_robot("mana")
-    joints = {f"{leg}_{joint}": v for leg, row in zip(LEGS, TABLE_4, strict=True) for joint, v in zip(JOINTS, row, strict=True)}
+    joints = {
+        f"{leg}_{joint}": v
+        for leg, row in zip(LEGS, TABLE_4, strict=True)
+        for joint, v in zip(JOINTS, row, strict=True)
+    }
     q = pin.neutral(robot.model)
     for name, value in joints.items():
         q[robot.joint_index(name)[0]] = value
     standing = Platform.of_robot(robot, robot.state(q))
-    feet = {leg: np.array([x, y, 0.0]) for leg, (x, y) in zip(LEGS, ((0.105, 0.08), (0.105, -0.08), (-0.105, -0.08), (-0.105, 0.08)), strict=True)}
+    feet = {
+        leg: np.array([x, y, 0.0])
+        for leg, (x, y) in zip(
+            LEGS, ((0.105, 0.08), (0.105, -0.08), (-0.105, -0.08), (-0.105, 0.08)), strict=True
+        )
+    }
     return Platform(standing.chains, feet), joints
 
 
@@ -81,7 +77,9 @@ def numbers(body: pin.SE3) -> Array:
 
 def named(rows: tuple[tuple[float, ...], ...]) -> dict[str, float]:
     """A table of joint angles, as joint -> angle."""
-    return {f"{leg}_{j}": v for leg, row in zip(LEGS, rows, strict=True) for j, v in zip(JOINTS, row, strict=True)}
+    return {
+        f"{leg}_{j}": v for leg, row in zip(LEGS, rows, strict=True) for j, v in zip(JOINTS, row, strict=True)
+    }
 
 
 def _geometry(d: float, l1: float, l3: float, hip_y: float, turned: bool = True) -> dict[str, ThreeJointLeg]:
@@ -116,16 +114,26 @@ def table_1() -> list[Row]:
     legs = stance()[0].legs
     leg, angles = legs["leg1"], np.array(TABLE_4[0])
     return [
-        Row(PAPER, "Table 1", "pelvis width d", 30.0, leg.offset * 1e3, 0.5, "mm", "d and l1 are swapped", True),
-        Row(PAPER, "Table 1", "pelvis length l1", 40.0, leg.l1 * 1e3, 0.5, "mm", "d and l1 are swapped", True),
-        Row(PAPER, "Table 1", "knee to contact l3", 105.0, leg.l3 * 1e3, 0.5, "mm", "to the foot ball's centre", True),
-        Row(PAPER, "Table 1", "H = l1 + l2 + 105", 210.0, (leg.l1 + leg.l2) * 1e3 + 105.0, 1e-9, "mm"),
-        Row(PAPER, "Table 1", "worst angle of Table 6, as printed", 0.0, printed, 1e-3, "rad", "lengths", True),
-        Row(PAPER, "Table 1", "worst angle of Table 6, ours", 0.0, swapped, 2e-4, "rad"),
-        Row(PAPER, "eq 16", "worst angle, right legs only translated", 0.0, untwisted, 1e-3, "rad",
-            "right legs are turned by half a turn", True),
-        Row(PAPER, "Table 4", "height of the body", 150.0, -float(leg.foot(angles)[2]) * 1e3, 0.01, "mm"),
-    ]  # fmt: skip
+        row("Table 1", "pelvis width d", 30.0, leg.offset * 1e3, 0.5, "mm", "d and l1 are swapped", True),
+        row("Table 1", "pelvis length l1", 40.0, leg.l1 * 1e3, 0.5, "mm", "d and l1 are swapped", True),
+        row(
+            "Table 1", "knee to contact l3", 105.0, leg.l3 * 1e3, 0.5, "mm", "to the foot ball's centre", True
+        ),
+        row("Table 1", "H = l1 + l2 + 105", 210.0, (leg.l1 + leg.l2) * 1e3 + 105.0, 1e-9, "mm"),
+        row("Table 1", "worst angle of Table 6, as printed", 0.0, printed, 1e-3, "rad", "lengths", True),
+        row("Table 1", "worst angle of Table 6, ours", 0.0, swapped, 2e-4, "rad"),
+        row(
+            "eq 16",
+            "worst angle, right legs only translated",
+            0.0,
+            untwisted,
+            1e-3,
+            "rad",
+            "right legs are turned by half a turn",
+            True,
+        ),
+        row("Table 4", "height of the body", 150.0, -float(leg.foot(angles)[2]) * 1e3, 0.01, "mm"),
+    ]
 
 
 def table_2() -> list[Row]:
@@ -143,7 +151,14 @@ def table_2() -> list[Row]:
             through = max(float(np.linalg.norm(w[3:] - np.cross(foot, w[:3]))) for w in wrenches)
             lines = len(wrenches) if through < 1e-9 else -1
             name = " and ".join(str(j + 1) for j in locked)
-            rows.append(Row(PAPER, "Table 2", f"lines through the foot, joints {name} locked", float(count), float(lines)))
+            rows.append(
+                row(
+                    "Table 2",
+                    f"lines through the foot, joints {name} locked",
+                    float(count),
+                    float(lines),
+                )
+            )
     return rows
 
 
@@ -178,156 +193,45 @@ def table_3(poses: int = 20) -> list[Row]:
             census.append(sum(s.regular for s in actuated_sets(platform, joints)))
     third = sum(len(leg) > 0 for leg in TABLE_3[0])
     return [
-        Row(PAPER, "Table 3", f"listed sets of rank 6 at home (of {len(listed)})", float(len(listed)), float(sum(r == 6 for r in ranks[0]))),
-        Row(PAPER, "Table 3", f"least rank of them, {poses} poses", 6.0, float(min(map(min, ranks)))),
-        Row(PAPER, "Table 3", "their determinants keep their signs", "yes", "yes" if len(signs) == 1 else "no"),
-        Row(PAPER, "Table 3", "3+3+0+0: largest rank (no feasible one)", "5", str(max(bad)), why="turn about the line of two feet"),
-        Row(PAPER, "Table 3", "first row: joints of legs 1 to 4", "3+2+0+1", "+".join(str(len(leg)) for leg in TABLE_3[0]),
-            why="the row lists other joints than its label", misprint=True),
-        Row(PAPER, "Table 3", "legs used by its first row", 3.0, float(third)),
-        Row(PAPER, "Table 3", "regular sets of 924 at home", None, float(census[0])),
-        Row(PAPER, "Table 3", "regular sets of 924, generic pose", None, float(census[1]), why="all but 3+3+0+0"),
-        Row(PAPER, "Principle II", "rank depends on the configuration", "no", "yes" if census[0] != census[1] else "no",
-            why="424 sets at home, 918 elsewhere", misprint=True),
-    ]  # fmt: skip
-
-
-def table_6() -> list[Row]:
-    """Inverse displacement of Table 5's pose from Table 4's."""
-    platform, home = stance()
-    start = pose([0.0] * 6)
-    feet = {name: start.act(leg.foot([home[j] for j in leg.joints])) for name, leg in platform.legs.items()}
-    joints = Platform(platform.chains, feet).nearest_joints(pose(TABLE_5), home)
-    return [
-        Row(PAPER, "Table 6", name.replace("_", " "), printed, joints[name], 5e-5, "rad")
-        for name, printed in named(TABLE_6).items()
+        row(
+            "Table 3",
+            f"listed sets of rank 6 at home (of {len(listed)})",
+            float(len(listed)),
+            float(sum(r == 6 for r in ranks[0])),
+        ),
+        row("Table 3", f"least rank of them, {poses} poses", 6.0, float(min(map(min, ranks)))),
+        row("Table 3", "their determinants keep their signs", "yes", "yes" if len(signs) == 1 else "no"),
+        row(
+            "Table 3",
+            "3+3+0+0: largest rank (no feasible one)",
+            "5",
+            str(max(bad)),
+            why="turn about the line of two feet",
+        ),
+        row(
+            "Table 3",
+            "first row: joints of legs 1 to 4",
+            "3+2+0+1",
+            "+".join(str(len(leg)) for leg in TABLE_3[0]),
+            why="the row lists other joints than its label",
+            misprint=True,
+        ),
+        row("Table 3", "legs used by its first row", 3.0, float(third)),
+        row("Table 3", "regular sets of 924 at home", None, float(census[0])),
+        row("Table 3", "regular sets of 924, generic pose", None, float(census[1]), why="all but 3+3+0+0"),
+        row(
+            "Principle II",
+            "rank depends on the configuration",
+            "no",
+            "yes" if census[0] != census[1] else "no",
+            why="424 sets at home, 918 elsewhere",
+            misprint=True,
+        ),
     ]
-
-
-def table_7() -> list[Row]:
-    """The pose that all twelve angles of Table 6 give (the paper's is from ADAMS)."""
-    platform, _ = stance()
-    ours = numbers(platform.pose_of(named(TABLE_6)))
-    ours[5] -= 150.0
-    labels = ("roll", "pitch", "yaw", "x", "y", "z")
-    return [
-        Row(PAPER, "Table 7", label, printed, float(mine), 0.4 if k < 3 else 0.25, "deg" if k < 3 else "mm", "ADAMS")
-        for k, (label, printed, mine) in enumerate(zip(labels, TABLE_7, ours, strict=True))
-    ]
-
-
-def table_8_known() -> dict[str, float]:
-    """The six angles of section 4.3.2: leg 1 all, leg 2 hip 2 and knee, leg 4 knee, from Table 6."""
-    every = named(TABLE_6)
-    return {j: every[j] for j in (*(f"leg1_{j}" for j in JOINTS), "leg2_hip2", "leg2_knee", "leg4_knee")}
-
-
-def table_8() -> list[Row]:
-    """Forward displacement: every pose for six angles."""
-    platform, home = stance()
-    known, near = table_8_known(), pose([0.0] * 6)
-    forward(platform, known, near)
-    begun = time.perf_counter()
-    found = forward(platform, known, near, method="elimination")
-    seconds = time.perf_counter() - begun
-    by_start = forward(platform, known, near, method="multi-start")
-    rows = [
-        Row(PAPER, "Table 8", "distinct real solutions", 8.0, float(len(found.solutions)), why="eight are four, each twice", misprint=True),
-        Row(PAPER, "Table 8", "distinct real ones among the eight", 4.0, float(len(found.solutions))),
-        Row(PAPER, "Table 8", "the same from random starts", None, float(len(by_start.solutions))),
-        Row(PAPER, "Table 8", "solutions within all limits", None, float(len(found.admissible)), why="4 = 7, Table 5's pose"),
-        Row(PAPER, "section 5.1", "seconds for all poses", 90.0, seconds, 0.0, "s", "printed: over 90", time=True),
-    ]  # fmt: skip
-    for (first, second), printed in zip(TABLE_8_PAIRS, TABLE_8, strict=True):
-        gaps = [np.abs(numbers(s.pose) - printed) for s in found.solutions]
-        best = min(gaps, key=lambda g: float(g.max()))
-        label = f"no. {first} = {second}: "
-        rows.append(Row(PAPER, "Table 8", label + "worst angle from print", 0.0, float(best[:3].max()), 0.0055, "deg"))
-        rows.append(Row(PAPER, "Table 8", label + "worst shift from print", 0.0, float(best[3:].max()), 0.0025, "mm"))
-    names = list(known)
-    follower = Follower(platform, home, names)
-    spans = []
-    for k in range(1, 101):
-        joints = platform.nearest_joints(pose(np.array(TABLE_5) * k / 100.0), home)
-        begun = time.perf_counter()
-        follower.step([joints[n] for n in names])
-        spans.append(time.perf_counter() - begun)
-    rows.append(Row(PAPER, "section 4.2", "one step along a path (median)", None, float(np.median(spans)) * 1e6, 0.0, "us"))
-    return rows
-
-
-def within(body: pin.SE3) -> bool:
-    """Whether every leg reaches its foot within the limits of section 5.1, hip 1 below the hip."""
-    platform, _ = stance()
-    return all(s.within for s in platform.inverse(body).values())
-
-
-def farthest(direction: ArrayLike) -> float:
-    """How far along six numbers (degrees, mm) the body goes from (0, 0, 150) before a leg cannot."""
-    along = np.asarray(direction, dtype=np.float64)
-    low, step = 0.0, 1.0
-    while within(pose(along * (low + step))):
-        low += step
-    for _ in range(HALVINGS):
-        step /= 2.0
-        if within(pose(along * (low + step))):
-            low += step
-    return low
-
-
-def table_9() -> list[Row]:
-    """Rotation about each axis alone, and translation, from (0, 0, 150)."""
-    rows = []
-    for k, (axis, printed) in enumerate(zip("XYZ", (52.0, 27.0, 49.0), strict=True)):
-        for sign in (-1.0, 1.0):
-            ours = farthest(sign * np.eye(6)[k])
-            what = f"{'largest' if sign > 0 else 'smallest'} rotation about {axis} (printed: whole degrees)"
-            rows.append(Row(PAPER, "Table 9", what, sign * printed, sign * math.floor(ours), 0.0, "deg", f"exactly {sign * ours:.4f}"))
-    for label, axis, sign in (("x", 3, 1.0), ("y", 4, 1.0), ("up", 5, 1.0), ("down", 5, -1.0)):
-        rows.append(Row(PAPER, "section 5.1", f"translation {label} from home", None, farthest(sign * np.eye(6)[axis]), unit="mm"))
-    return rows
-
-
-def helix(count: int = 400) -> list[Array]:
-    """Section 5.3.1: body positions [mm], (0,0,150), (50,0,150), three turns of radius 50 and pitch 10, back."""
-    turns = np.linspace(0.0, 3.0, count)
-    out = [np.array([50.0 * s, 0.0, 150.0]) for s in np.linspace(0, 1, count // 4)]
-    winding = [np.array([50.0 * math.cos(2 * math.pi * t), 50.0 * math.sin(2 * math.pi * t), 150.0 + 10.0 * t]) for t in turns]
-    back = [np.array([50.0 * (1 - s), 0.0, 180.0]) for s in np.linspace(0, 1, count // 4)]
-    return [*out, *winding, *back]
-
-
-def section_5_3() -> list[Row]:
-    """The helix and the combined motion: inside the limits, and how far the latter goes as printed."""
-    platform, home = stance()
-    near = dict(home)
-    largest = dict.fromkeys(JOINTS, 0.0)
-    lowest, gap = "inside", 0.0
-    for position in helix():
-        body = pin.SE3(np.eye(3), position / 1e3)
-        try:
-            near = platform.nearest_joints(body, near)
-        except SolveError as error:
-            lowest = str(error)
-            break
-        gap = max(gap, float(np.abs(platform.pose_of(near).translation - body.translation).max()))
-        for joint in JOINTS:
-            largest[joint] = max(largest[joint], *(abs(near[f"{leg}_{joint}"]) for leg in LEGS))
-    return [
-        Row(PAPER, "section 5.3.1", "helix within limits", "inside", lowest),
-        *(Row(PAPER, "section 5.3.1", f"largest {j} on the helix", None, math.degrees(largest[j]), unit="deg") for j in JOINTS),
-        Row(PAPER, "Fig 8", "pose from the planned angles", 0.0, gap * 1e3, 1e-6, "mm"),
-        Row(PAPER, "section 5.3.2", "share of (40,30,30) mm and (20,20,20) deg in reach", 1.0,
-            min(1.0, farthest([20.0, 20.0, 20.0, 40.0, 30.0, 30.0])), 1e-3, "", "out of reach at once; one after the other", True),
-        Row(PAPER, "section 5.3.2", "share of (20,20,20) deg alone", 1.0, min(1.0, farthest([20.0, 20.0, 20.0, 0, 0, 0])), 1e-3, "",
-            "out of reach; each rotation alone is feasible", True),
-        Row(PAPER, "section 5.3.2", "(40,30,30) mm, and 20 deg about each axis alone", "yes",
-            "yes" if all(farthest(d) >= 1.0 for d in ([0, 0, 0, 40, 30, 30], *(20 * np.eye(6)[k] for k in range(3)))) else "no"),
-    ]  # fmt: skip
 
 
 def equations() -> list[Row]:
-    """Equations 23 to 31: where each leg's equations are satisfied, and what is left of eq. 26 at theta1 = 0."""
+    """Equations 25 to 31: which of them are satisfied, and what is left of eq. 26 at hip 1 = 0."""
     d, l1, l2, l3 = 40.0, 30.0, 75.0, 97.0
     leg = _geometry(0.040, 0.030, 0.097, 0.040)["leg1"]
     left, worst = [], 0.0
@@ -344,12 +248,28 @@ def equations() -> list[Row]:
         plus = x * x + y * y + z * z + 2 * l1 * rho - (k + d * d - l1 * l1)
         minus = x * x + y * y + z * z - 2 * l1 * rho - (k + d * d - l1 * l1)
     return [
-        Row(PAPER, "eq 26", "its residual at hip 1 = 0 and 0.3 rad", 0.0, worst, 1e-8, "mm^2"),
-        Row(PAPER, "eqs 25, 26", "independent equations at hip 1 = 0.3 rad", 2.0, float(left[1])),
-        Row(PAPER, "eqs 25, 26", "independent equations at hip 1 = 0", 2.0, float(left[0]), why="eq 26 is 0 = 0 there", misprint=True),
-        Row(PAPER, "eq 31", "residual with the lower sign", 0.0, minus, 1e-8, "mm^2", "the leg below its hip"),
-        Row(PAPER, "eq 31", "residual with the upper sign", 0.0, plus, 1.0, "mm^2", "the leg above its hip only", True),
+        row("eq 26", "its residual at hip 1 = 0 and 0.3 rad", 0.0, worst, 1e-8, "mm^2"),
+        row("eqs 25, 26", "independent equations at hip 1 = 0.3 rad", 2.0, float(left[1])),
+        row(
+            "eqs 25, 26",
+            "independent equations at hip 1 = 0",
+            2.0,
+            float(left[0]),
+            why="eq 26 is 0 = 0 there",
+            misprint=True,
+        ),
+        row("eq 31", "residual with the lower sign", 0.0, minus, 1e-8, "mm^2", "the leg below its hip"),
+        row(
+            "eq 31",
+            "residual with the upper sign",
+            0.0,
+            plus,
+            1.0,
+            "mm^2",
+            "the leg above its hip only",
+            True,
+        ),
     ]
 
 
-TABLES = (table_1, table_2, equations, table_3, table_6, table_7, table_8, table_9, section_5_3)
+TABLES = (table_1, table_2, equations, table_3)

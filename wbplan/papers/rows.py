@@ -49,7 +49,11 @@ class Row:
         if self.printed is None:
             return FOUND
         if self.time:
-            faster = not isinstance(self.ours, str) and not isinstance(self.printed, str) and self.ours < self.printed
+            faster = (
+                not isinstance(self.ours, str)
+                and not isinstance(self.printed, str)
+                and self.ours < self.printed
+            )
             return FASTER if faster else DIFFERS
         if self.misprint:
             return DIFFERS if self.agrees else MISPRINT

@@ -1,9 +1,10 @@
-"""Zheng's radial hexapod with leg-arm integration: FK, IK with body compensation, mobility, stability radii."""
+"""Zheng's radial hexapod with leg-arm integration: FK, IK with compensation, mobility, stability radii."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +17,7 @@ from wbplan.robot import load_robot
 
 Array = NDArray[np.float64]
 
-PAPER = "Zheng"
+row = partial(Row, "Zheng")
 EXAMPLE = np.radians([60.0, -10.0, 30.0, 40.0, 50.0])
 #: The clamp as drawn (Fig. 8): both limbs parallel to the y-z plane, arms level, tools facing each other.
 DRAWN = np.array([np.pi / 2, 0.3, -0.5, 0.2, -np.pi / 2, np.pi / 2, 0.3, -0.5, 0.2, np.pi / 2])
@@ -62,11 +63,14 @@ def equation_20() -> list[Row]:
         wrong = max(wrong, abs(b + arm.l5 * printed[2, 0] - exact.translation[2]))
     p = arm.pose(EXAMPLE).translation * 1e3
     return [
-        Row(PAPER, "eq 20", "rotation against eq 19, worst of 500", 0.0, rotation, 1e-12),
-        Row(PAPER, "eq 20", "z = +b + l5 r31 against eq 19, worst", 0.0, wrong * 1e3, 1e-9, "mm", "sign of b", True),
-        Row(PAPER, "eq 20", "z = -b + l5 r31 against eq 19, worst", 0.0, right * 1e3, 1e-9, "mm"),
-        *(Row(PAPER, "eq 20", f"{axis} at (60, -10, 30, 40, 50) deg", None, float(v), unit="mm") for axis, v in zip("xyz", p, strict=True)),
-    ]  # fmt: skip
+        row("eq 20", "rotation against eq 19, worst of 500", 0.0, rotation, 1e-12),
+        row("eq 20", "z = +b + l5 r31 against eq 19, worst", 0.0, wrong * 1e3, 1e-9, "mm", "sign of b", True),
+        row("eq 20", "z = -b + l5 r31 against eq 19, worst", 0.0, right * 1e3, 1e-9, "mm"),
+        *(
+            row("eq 20", f"{axis} at (60, -10, 30, 40, 50) deg", None, float(v), unit="mm")
+            for axis, v in zip("xyz", p, strict=True)
+        ),
+    ]
 
 
 def _printed_fk(arm: FiveJointLimb, q: Array) -> tuple[float, float, Array]:
@@ -95,18 +99,27 @@ def mobility_rows() -> list[Row]:
     couple = drawn.wrenches[0][0] * np.sign(drawn.wrenches[0][0][4])
     off = float(np.abs(couple - np.array([0, 0, 0, 0, 1.0, 0])).max())
     return [
-        Row(PAPER, "eq 3", "rank of each branch", "5, 5", ", ".join(map(str, drawn.ranks))),
-        Row(PAPER, "eq 3", "constraint is the couple (000; 010), off by", 0.0, off, 1e-9),
-        Row(PAPER, "eq 4", "redundant constraints", 1.0, float(drawn.redundant)),
-        Row(PAPER, "eq 5", "common constraints", 1.0, float(drawn.common)),
-        Row(PAPER, "eq 6", "virtual constraints", 0.0, float(drawn.virtual)),
-        Row(PAPER, "eq 7", "mobility, modified Gruebler, as drawn", 5.0, float(drawn.grubler)),
-        Row(PAPER, "eq 7", "mobility, rank of the loop, as drawn", 5.0, float(drawn.mobility)),
-        Row(PAPER, "eq 7", "mobility, rank of Pinocchio's Jacobian", 5.0, float(10 - _pinocchio_rank(robot, DRAWN))),
-        Row(PAPER, "eq 7", f"mobility, {len(near)} closed configurations near it", 5.0, float(max(near)), misprint=True,
-            why="five is instantaneous; four are finite"),
-        *(Row(PAPER, "eq 7", f"departure of a rate {name}, per step", None, ratio, why=why) for name, ratio, why in departures(loop)),
-    ]  # fmt: skip
+        row("eq 3", "rank of each branch", "5, 5", ", ".join(map(str, drawn.ranks))),
+        row("eq 3", "constraint is the couple (000; 010), off by", 0.0, off, 1e-9),
+        row("eq 4", "redundant constraints", 1.0, float(drawn.redundant)),
+        row("eq 5", "common constraints", 1.0, float(drawn.common)),
+        row("eq 6", "virtual constraints", 0.0, float(drawn.virtual)),
+        row("eq 7", "mobility, modified Gruebler, as drawn", 5.0, float(drawn.grubler)),
+        row("eq 7", "mobility, rank of the loop, as drawn", 5.0, float(drawn.mobility)),
+        row("eq 7", "mobility, rank of Pinocchio's Jacobian", 5.0, float(10 - _pinocchio_rank(robot, DRAWN))),
+        row(
+            "eq 7",
+            f"mobility, {len(near)} closed configurations near it",
+            5.0,
+            float(max(near)),
+            misprint=True,
+            why="five is instantaneous; four are finite",
+        ),
+        *(
+            row("eq 7", f"departure of a rate {name}, per step", None, ratio, why=why)
+            for name, ratio, why in departures(loop)
+        ),
+    ]
 
 
 def departures(loop: ClampLoop, step: float = 0.003) -> list[tuple[str, float, str]]:
@@ -143,7 +156,9 @@ def inverse_rows(count: int = 300) -> list[Row]:
     """Equations 23 to 31: each corrected form against targets made with known joints and shifts."""
     arm, targets = limb(), _random_targets(count)
     tries: dict[str, Callable[[Array, pin.SE3, float, float], bool]] = {
-        "28": lambda q, t, travel, shift: _close(_orientation(t.rotation, False), (q[0], q[1] + q[2] + q[3], q[4])),
+        "28": lambda q, t, travel, shift: _close(
+            _orientation(t.rotation, False), (q[0], q[1] + q[2] + q[3], q[4])
+        ),
         "28 printed": lambda q, t, travel, shift: _close(
             _orientation(t.rotation, True), (q[0], q[1] + q[2] + q[3], q[4])
         ),
@@ -157,19 +172,46 @@ def inverse_rows(count: int = 300) -> list[Row]:
     share = {name: float(sum(f(*t) for t in targets)) / count for name, f in tries.items()}
     one_four, three = _case_one(arm)
     return [
-        Row(PAPER, "eq 28", "orientations solved, arguments as printed", 1.0, share["28 printed"], 1e-9, "", "atan2 arguments swapped", True),
-        Row(PAPER, "eq 28", "orientations solved, arguments (y, x)", 1.0, share["28"], 1e-9),
-        Row(PAPER, "eq 23", "targets met with P + dl n", 1.0, share["23 printed"], 1e-9, "", "sign: P - dl n, as in eqs 27, 29", True),
-        Row(PAPER, "eq 23", "targets met with P - dl n", 1.0, share["23"], 1e-9),
-        Row(PAPER, "eqs 29, 31", "joints and shift recovered (case 2.3)", 1.0, share["29"], 1e-9),
-        Row(PAPER, "eq 26", "recovered without shift (case 1.4)", 1.0, one_four, 1e-9),
-        Row(PAPER, "eq 27", "least shift brings into reach (case 1.3)", 1.0, three, 1e-9, "", "root of the smaller |dl|"),
+        row(
+            "eq 28",
+            "orientations solved, arguments as printed",
+            1.0,
+            share["28 printed"],
+            1e-9,
+            "",
+            "atan2 arguments swapped",
+            True,
+        ),
+        row("eq 28", "orientations solved, arguments (y, x)", 1.0, share["28"], 1e-9),
+        row(
+            "eq 23",
+            "targets met with P + dl n",
+            1.0,
+            share["23 printed"],
+            1e-9,
+            "",
+            "sign: P - dl n, as in eqs 27, 29",
+            True,
+        ),
+        row("eq 23", "targets met with P - dl n", 1.0, share["23"], 1e-9),
+        row("eqs 29, 31", "joints and shift recovered (case 2.3)", 1.0, share["29"], 1e-9),
+        row("eq 26", "recovered without shift (case 1.4)", 1.0, one_four, 1e-9),
+        row(
+            "eq 27",
+            "least shift brings into reach (case 1.3)",
+            1.0,
+            three,
+            1e-9,
+            "",
+            "root of the smaller |dl|",
+        ),
         *_reach_rows(arm),
-    ]  # fmt: skip
+    ]
 
 
 def _orientation(r: Array, swapped: bool) -> tuple[float, float, float]:
     """Eq. 28: theta1, thetax, theta5; as printed, or with atan2's arguments in its usual order."""
+
     def arctan(first: float, second: float) -> float:
         return math.atan2(first, second) if swapped else math.atan2(second, first)
 
@@ -182,7 +224,10 @@ def _close(found: tuple[float, float, float], right: tuple[float, float, float])
     """Equal modulo a turn, or in the other branch (both ends turned round, pitch reversed)."""
     one, x, five = found
     branches = ((one, x, five), (one + math.pi, -x, five + math.pi))
-    return any(max(abs(math.remainder(a - b, 2 * math.pi)) for a, b in zip(f, right, strict=True)) < 1e-8 for f in branches)
+    return any(
+        max(abs(math.remainder(a - b, 2 * math.pi)) for a, b in zip(f, right, strict=True)) < 1e-8
+        for f in branches
+    )
 
 
 def _lands(arm: FiveJointLimb, q: Array, target: pin.SE3, travel: float, shift: float) -> bool:
@@ -227,30 +272,63 @@ def _reach_rows(arm: FiveJointLimb, count: int = 40000) -> list[Row]:
     inside = (np.hypot(ta, tb) >= arm.reach[0]) & (np.hypot(ta, tb) <= arm.reach[1])
     lost = 100.0 * float(1.0 - inside.mean())
     return [
-        Row(PAPER, "eq 22", "share of its disc out of reach for a given thetax", 0.0, lost, 0.5, "%", "only necessary: 80 <= S <= 320 mm", True),
-        Row(PAPER, "eq 31", "least distance of joint 4 from joint 2", None, arm.reach[0] * 1e3, unit="mm"),
-        Row(PAPER, "eq 31", "largest distance of joint 4 from joint 2", None, arm.reach[1] * 1e3, unit="mm"),
-    ]  # fmt: skip
+        row(
+            "eq 22",
+            "share of its disc out of reach for a given thetax",
+            0.0,
+            lost,
+            0.5,
+            "%",
+            "only necessary: 80 <= S <= 320 mm",
+            True,
+        ),
+        row("eq 31", "least distance of joint 4 from joint 2", None, arm.reach[0] * 1e3, unit="mm"),
+        row("eq 31", "largest distance of joint 4 from joint 2", None, arm.reach[1] * 1e3, unit="mm"),
+    ]
 
 
 def figure_16() -> list[Row]:
     """Stability radii of regular stances, circle radius 1."""
-    six, five = ([(math.cos(2 * math.pi * k / n), math.sin(2 * math.pi * k / n)) for k in range(n)] for n in (6, 5))
+    six, five = (
+        [(math.cos(2 * math.pi * k / n), math.sin(2 * math.pi * k / n)) for k in range(n)] for n in (6, 5)
+    )
     three = support_polygon([five[0], five[2], five[3]])  # two non-adjacent legs lifted: 1 and 4
     best, widest = three.chebyshev()
     gain = widest - three.margin([0.0, 0.0])
     away = float(np.linalg.norm(best))
     return [
-        Row(PAPER, "Fig 16", "six legs", math.sqrt(3) / 2, support_polygon(six).chebyshev()[1], 1e-9, "CR"),
-        Row(PAPER, "Fig 16", "three of six legs", 0.5, support_polygon(six[::2]).chebyshev()[1], 1e-9, "CR"),
-        Row(PAPER, "Fig 16", "five legs", 0.809, support_polygon(five).chebyshev()[1], 5e-4, "CR"),
-        Row(PAPER, "Fig 16", "three of five legs, best point", 0.427, widest, 5e-4, "CR"),
-        Row(PAPER, "Fig 16", "three of five legs, centre", 0.309, three.margin([0.0, 0.0]), 5e-4, "CR"),
-        Row(PAPER, "Fig 16", "distance from the centre to the best point", 0.118, away, 5e-4, "CR", "0.118 is the margin's gain", True),
-        Row(PAPER, "Fig 16", "gain of margin at the best point", 0.118, gain, 5e-4, "CR"),
-        Row(PAPER, "section 4.2", "four of five legs, centre", 0.309, support_polygon(five[1:]).margin([0.0, 0.0]), 5e-4, "CR"),
-        Row(PAPER, "section 4.2", "four of five legs, best point", None, support_polygon(five[1:]).chebyshev()[1], unit="CR"),
-    ]  # fmt: skip
+        row("Fig 16", "six legs", math.sqrt(3) / 2, support_polygon(six).chebyshev()[1], 1e-9, "CR"),
+        row("Fig 16", "three of six legs", 0.5, support_polygon(six[::2]).chebyshev()[1], 1e-9, "CR"),
+        row("Fig 16", "five legs", 0.809, support_polygon(five).chebyshev()[1], 5e-4, "CR"),
+        row("Fig 16", "three of five legs, best point", 0.427, widest, 5e-4, "CR"),
+        row("Fig 16", "three of five legs, centre", 0.309, three.margin([0.0, 0.0]), 5e-4, "CR"),
+        row(
+            "Fig 16",
+            "distance from the centre to the best point",
+            0.118,
+            away,
+            5e-4,
+            "CR",
+            "0.118 is the margin's gain",
+            True,
+        ),
+        row("Fig 16", "gain of margin at the best point", 0.118, gain, 5e-4, "CR"),
+        row(
+            "section 4.2",
+            "four of five legs, centre",
+            0.309,
+            support_polygon(five[1:]).margin([0.0, 0.0]),
+            5e-4,
+            "CR",
+        ),
+        row(
+            "section 4.2",
+            "four of five legs, best point",
+            None,
+            support_polygon(five[1:]).chebyshev()[1],
+            unit="CR",
+        ),
+    ]
 
 
 TABLES = (equation_20, mobility_rows, inverse_rows, figure_16)

@@ -1,0 +1,47 @@
+"""The papers' kinematics, table by table: printed value, ours, verdict; computed when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rich.table import Table
+
+from wbplan.errors import SpecError, listing
+from wbplan.papers import hexpiderix, hiphant, mana, mana_motion, zheng, zhuang
+from wbplan.papers.rows import DIFFERS, Row
+
+__all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
+
+PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
+    "mana": mana.TABLES + mana_motion.TABLES,
+    "zheng": zheng.TABLES,
+    "hexpiderix": hexpiderix.TABLES,
+    "hiphant": hiphant.TABLES,
+    "zhuang": zhuang.TABLES,
+}
+"""Paper -> its tables, each a function that computes the rows."""
+
+
+def report(paper: str | None = None) -> list[Row]:
+    """Computes the rows of one paper, or of all.
+
+    Args:
+        paper: a key of `PAPERS`.
+
+    Raises:
+        SpecError: there is no such paper.
+    """
+    if paper is not None and paper not in PAPERS:
+        raise SpecError(f"no paper {paper!r}; papers: {listing(list(PAPERS))}")
+    chosen = PAPERS if paper is None else {paper: PAPERS[paper]}
+    return [row for tables in chosen.values() for table in tables for row in table()]
+
+
+def summary(cells: list[tuple[str, ...]]) -> Table:
+    """A table of rows, as their `cells`."""
+    table = Table(title="What the papers print, and what comes out here")
+    for heading in ("paper", "table", "quantity", "printed", "ours", "verdict", "remark"):
+        table.add_column(heading, overflow="fold")
+    for row in cells:
+        table.add_row(*row)
+    return table
