@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from rich.console import Console
+
+from wbplan.papers import summary
 
 # The same examples each time: a red run can be run again, and a slow machine is no failure.
 settings.register_profile("wbplan", deadline=None, derandomize=True)
@@ -16,3 +19,14 @@ settings.load_profile("wbplan")
 def root() -> Path:
     """The repository's folder."""
     return Path(__file__).resolve().parent.parent
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What the papers print beside what came out in this run, where their tests ran."""
+    reports = [r for outcome in ("passed", "failed") for r in terminalreporter.stats.get(outcome, [])]
+    rows = [tuple(cells) for r in reports for key, cells in r.user_properties if key == "paper"]
+    if rows:
+        console = Console(width=150, markup=False, highlight=False, emoji=False)
+        with console.capture() as text:
+            console.print(summary(sorted(rows, key=lambda cells: cells[0])))
+        terminalreporter.write(f"\n{text.get()}")

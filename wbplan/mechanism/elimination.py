@@ -128,7 +128,7 @@ def _third_foot(b1: Array, b2: Array, world: list[Array]) -> Callable[[Array], A
 def _equation(leg: ThreeJointLeg, joint: int, value: float) -> Callable[[Array], Array]:
     """Feet (S, 3) in the body -> (S,), zero where the leg's one known joint has its value, for either rho.
 
-    With the foot (x, y, z) in the leg's frame, h = up z, rho^2 = x^2 + y^2 - offset^2 and G = rho^2 + h^2 ...:
+    With (x, y, z) the foot in the leg, h = up z, rho^2 = x^2 + y^2 - offset^2 and G = rho^2 + h^2 ...:
     joint 1: y cos q1 - x sin q1 = offset; joint 2: (rho - l1 - l2 c2)^2 + (h - l2 s2)^2 = l3^2;
     joint 3: (rho - l1)^2 + h^2 = l2^2 + l3^2 + 2 l2 l3 c3. The last two are G - k rho = 0, taken as
     G^2 - k^2 rho^2 = 0.

@@ -168,10 +168,7 @@ class FiveJointLimb:
             if result.within:
                 return result
         if seen:
-            found_at_all = self._sorted(
-                [], "1.2", "every shift that brings the tip into reach breaks a joint limit"
-            )
-            return found_at_all
+            return self._sorted([], "1.2", "every shift that brings the tip into reach breaks a joint limit")
         possible = min((abs(s) for s in roots), default=math.inf)
         if math.isfinite(possible):
             return self._sorted(

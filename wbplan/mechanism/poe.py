@@ -44,7 +44,7 @@ class Chain:
         return pin.SE3(rotation, translation) * self.home
 
     def screws_at(self, q: ArrayLike) -> Array:
-        """(n, 6) joint screws at q, in the body's frame: row j: the tip's twist for a unit rate of joint j."""
+        """(n, 6) joint screws at q, in the body: row j is the tip's twist for a unit rate of joint j."""
         return np.asarray(chain_pose(self.screws, self._checked(q))[2], dtype=np.float64)
 
     def point_jacobian(self, q: ArrayLike) -> Array:

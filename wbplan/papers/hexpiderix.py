@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.mechanism import (
+    Chain,
     Platform,
     StanceLeg,
     ThreeJointLeg,
@@ -247,6 +248,42 @@ def moved(seed: int) -> tuple[Array, Array, Array]:
     turned = pin.SE3(pin.exp3(random.uniform(-0.4, 0.4, 3)), random.uniform(-0.1, 0.1, 3))
     q[:7] = pin.SE3ToXYZQUAT(turned * pin.XYZQUATToSE3(q[:7]))
     return q, random.uniform(-1, 1, 9), random.uniform(-1, 1, 9)
+
+
+def drifted(
+    q: Array, twist: Array, speed: Array, rise: Array, seconds: float
+) -> tuple[list[StanceLeg], list[Array]]:
+    """The legs a moment later: body moved by its twist, joints by their rates; feet where the cups hold them.
+
+    Args:
+        q: (nq,) configuration.
+        twist: (6,) of the body.
+        speed, rise: (9,) rates and accelerations of the stance legs' joints.
+        seconds: how much later.
+    """
+    own, (_, names, _) = robot(), legs(q=q)
+    later = np.array(q)
+    body = pin.XYZQUATToSE3(q[:7])
+    later[:7] = pin.SE3ToXYZQUAT(pin.exp6(pin.Motion(swap(twist) * seconds)) * body)
+    for k, name in enumerate(names):
+        later[own.joint_index(name)[0]] += speed[k] * seconds + 0.5 * rise[k] * seconds**2
+    state, moved_body = own.state(later), pin.XYZQUATToSE3(later[:7])
+    chains = Platform.of_robot(own, state, STANCE).chains
+    held = Platform.of_robot(own, own.state(q), STANCE).feet
+    out = []
+    for name, chain in chains.items():
+        angles = np.array([later[own.joint_index(j)[0]] for j in chain.joints])
+        # The cup holds the wall where it did: its point there, not the tibia's tip, is on the screws' axes.
+        fixed = moved_body.actInv(held[name])
+        cup = Chain(chain.joints, chain.screws, _tip_at(chain, angles, fixed), chain.lower, chain.upper)
+        out.append(cup_leg(cup, angles, moved_body, direction(name, "tibia", later)))
+    return out, list((speed + rise * seconds).reshape(3, 3))
+
+
+def _tip_at(chain: Chain, angles: Array, point: Array) -> pin.SE3:
+    """The home pose of a chain whose tip would be at a point (3,) of the body at these joint angles."""
+    moved = chain.pose(angles) * chain.home.inverse()
+    return pin.SE3(np.eye(3), moved.actInv(point))
 
 
 def rates(count: int = 5) -> list[Row]:

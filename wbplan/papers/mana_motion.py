@@ -111,8 +111,8 @@ def table_8() -> list[Row]:
     names = list(known)
     follower = Follower(platform, home, names)
     spans = []
-    for k in range(1, 101):
-        joints = platform.nearest_joints(pose(np.array(TABLE_5) * k / 100.0), home)
+    for part in range(1, 101):
+        joints = platform.nearest_joints(pose(np.array(TABLE_5) * part / 100.0), home)
         begun = time.perf_counter()
         follower.step([joints[n] for n in names])
         spans.append(time.perf_counter() - begun)

@@ -1,0 +1,38 @@
+"""One test a group of Zheng's equations, and Figure 16."""
+
+from __future__ import annotations
+
+import pytest
+
+from wbplan.papers import zheng
+
+from .conftest import Judge
+
+
+def test_equation_20_forward_kinematics(judge: Judge) -> None:
+    rows = judge(zheng.equation_20())
+    right = {"x": 139.022437, "y": 401.663258, "z": -127.667274}
+    for axis, value in right.items():
+        assert rows[f"{axis} at (60, -10, 30, 40, 50) deg"].ours == pytest.approx(value, abs=1e-6)
+
+
+def test_equations_2_to_7_mobility_of_the_clamp(judge: Judge) -> None:
+    rows = judge(zheng.mobility_rows())
+    apart = {
+        name: rows[f"departure of a rate {name}, per step"].ours
+        for name in ("without tilt", "without yaw", "with both")
+    }
+    assert apart["without tilt"] < 2e-3  # type: ignore[operator]
+    assert apart["without yaw"] < 2e-3  # type: ignore[operator]
+    assert apart["with both"] > 0.05  # type: ignore[operator]
+
+
+def test_equations_22_to_31_inverse_kinematics(judge: Judge) -> None:
+    rows = judge(zheng.inverse_rows())
+    assert rows["share of its disc out of reach for a given thetax"].ours == pytest.approx(19.0, abs=1.0)
+
+
+def test_figure_16_stability_radii(judge: Judge) -> None:
+    rows = judge(zheng.figure_16())
+    assert rows["distance from the centre to the best point"].ours == pytest.approx(0.381966, abs=1e-6)
+    assert rows["four of five legs, best point"].ours == pytest.approx(0.5590, abs=1e-4)
