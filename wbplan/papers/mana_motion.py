@@ -10,10 +10,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wbplan.contacts import Contact
 from wbplan.errors import SolveError
+from wbplan.limits import JointLimits
 from wbplan.mechanism import Follower, Platform, forward
 from wbplan.papers.mana import JOINTS, LEGS, TABLE_5, TABLE_6, named, numbers, pose, stance
 from wbplan.papers.rows import Row
+from wbplan.paths import Waypoints
+from wbplan.planner import plan
+from wbplan.robot import load_robot
+from wbplan.script import Phase, Script
+from wbplan.tasks import PoseTask
 
 Array = NDArray[np.float64]
 row = partial(Row, "MANA")
@@ -247,4 +254,61 @@ def section_5_3() -> list[Row]:
     ]
 
 
-TABLES = (table_6, table_7, table_8, table_9, section_5_3)
+def _combined(count: int = 40) -> list[pin.SE3]:
+    """Section 5.3.2 in its feasible reading: half-sines out and back, the translation, then each turn alone."""
+    moves = [np.array([0.0, 0.0, 0.0, 40.0, 30.0, 30.0]), *(20.0 * np.eye(6)[k] for k in range(3))]
+    share = [math.sin(math.pi * k / count) for k in range(count)]
+    return [pose(move * part) for move in moves for part in share] + [pose([0.0] * 6)]
+
+
+def _planned(path: list[pin.SE3], seconds: float, dt: float, stride: int) -> tuple[float, float]:
+    """A path planned as a hard task of the body: worst error of its pose, and of its joints from the closed form.
+
+    Args:
+        path: T_world_body at equal intervals.
+        seconds: how long it takes.
+        dt: of a tick [s]; the planner linearises each, so joints differ by something of the order of its square.
+        stride: every so many ticks are compared.
+    """
+    robot = load_robot("mana")
+    platform, home = stance()
+    q = pin.neutral(robot.model)
+    for name, value in home.items():
+        q[robot.joint_index(name)[0]] = value
+    q[:7] = pin.SE3ToXYZQUAT(path[0])
+    start = robot.state(q)
+    standing = Platform.of_robot(robot, start)
+    times = np.linspace(0.0, seconds, len(path))
+    way = Waypoints(times, path)
+    phase = Phase(
+        "body",
+        contacts=[Contact(foot, friction=0.7) for foot in robot.feet.values()],
+        hard=[PoseTask("body", way)],
+        limits=[JointLimits()],
+        duration=seconds,
+    )
+    motion = plan(robot, Script(phase), start=start, dt=dt).bundle.trajectory
+    joints, body, near = 0.0, 0.0, dict(home)
+    for t, at in zip(motion.time[::stride], motion.q[::stride], strict=True):
+        asked = way.at(float(t))
+        near = standing.nearest_joints(asked, near)
+        planned = [at[robot.joint_index(j)[0]] for j in standing.joints]
+        joints = max(joints, float(np.abs(np.array(planned) - list(near.values())).max()))
+        body = max(body, float(np.abs(pin.log6(asked.actInv(pin.XYZQUATToSE3(at[:7]))).vector).max()))
+    return body, joints
+
+
+def figures_8_to_10() -> list[Row]:
+    """The motions of section 5.3, planned tick by tick as hard tasks, beside the closed form (spherical feet)."""
+    turns = [pin.SE3(np.eye(3), p / 1e3) for p in helix(120)]
+    rows = []
+    for figure, name, path in (("Fig 8", "helix", turns), ("Figs 9, 10", "combined motion", _combined())):
+        body, joints = _planned(path, 20.0, 0.001, 50)
+        rows += [
+            row(figure, f"{name} by the QP, worst of the pose", 0.0, body, 1e-6),
+            row(figure, f"{name} by the QP, worst joint from the closed form", 0.0, joints, 1e-6, "rad"),
+        ]
+    return rows
+
+
+TABLES = (table_6, table_7, table_8, table_9, section_5_3, figures_8_to_10)
