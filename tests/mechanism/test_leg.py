@@ -30,7 +30,7 @@ def test_every_branch_lands_on_the_foot_and_one_is_where_it_came_from(
     foot = leg.foot([one, two, three])
     found = leg.solve(foot)
     assert found.within
-    assert 1 <= len(found.within) <= 4
+    assert len({s.branch for s in found.within}) <= 4
     # The square root loses half the digits where the leg is straight or the foot on axis 1.
     for solution in found.within:
         np.testing.assert_allclose(leg.foot(solution.joints), foot, atol=2e-6)
@@ -53,9 +53,10 @@ def test_a_reason_is_given_exactly_where_nothing_is_found(
         reaches = [math.hypot(s * math.sqrt(square) - leg.l1, z) for s in (1, -1)]
         inside = any(abs(leg.l2 - leg.l3) <= r <= leg.l2 + leg.l3 for r in reaches)
     if inside != bool(found.within):  # only by rounding, at the edge
-        assert min(
-            abs(r - e) for r in reaches for e in (abs(leg.l2 - leg.l3), leg.l2 + leg.l3)
-        ) < 1e-6 or abs(square) < 1e-9
+        assert (
+            min(abs(r - e) for r in reaches for e in (abs(leg.l2 - leg.l3), leg.l2 + leg.l3)) < 1e-6
+            or abs(square) < 1e-9
+        )
 
 
 @pytest.mark.parametrize("name", sorted(catalog.robots()))
@@ -79,7 +80,10 @@ def test_a_range_of_more_than_a_turn_gives_every_turn_that_fits() -> None:
     leg = ThreeJointLeg(0.0, 0.3, 0.3, 0.08, lower=-np.full(3, 2.0 * np.pi), upper=np.full(3, 2.0 * np.pi))
     q = np.array([0.3, 0.4, 0.5])
     found = leg.solve(leg.foot(q))
-    assert sum(np.abs(np.remainder(s.joints - q + np.pi, 2 * np.pi) - np.pi).max() < 1e-9 for s in found.within) == 8
+    assert (
+        sum(np.abs(np.remainder(s.joints - q + np.pi, 2 * np.pi) - np.pi).max() < 1e-9 for s in found.within)
+        == 8
+    )
 
 
 def test_no_solution_says_why() -> None:
@@ -103,7 +107,9 @@ def test_no_solution_says_why() -> None:
 def test_a_chain_of_another_shape_is_refused(robots: dict[str, Robot]) -> None:
     with pytest.raises(SpecError, match="expected three revolute joints"):
         ThreeJointLeg.of(limb_chain(robots["legarm_hexapod"], "limb1", "limb1_tip"))
-    chain = limb_chain(robots["hiphant"], "arm").hold({"arm_joint1": 0.0, "arm_joint2": 0.0, "arm_joint3": 0.0})
+    chain = limb_chain(robots["hiphant"], "arm").hold(
+        {"arm_joint1": 0.0, "arm_joint2": 0.0, "arm_joint3": 0.0}
+    )
     with pytest.raises(SpecError, match="expected joints 2 and 3 parallel"):
         ThreeJointLeg.of(chain)
 

@@ -34,7 +34,11 @@ def test_adjoint_is_the_action_of_a_pose(turn: np.ndarray, shift: np.ndarray, sc
 
 
 def test_lines_that_meet_are_reciprocal_and_others_not() -> None:
-    first, crossing, apart = line([1, 0, 0], [0, 0, 0]), line([0, 2, 0], [3, 5, 0]), line([0, 1, 0], [0, 0, 0.2])
+    first, crossing, apart = (
+        line([1, 0, 0], [0, 0, 0]),
+        line([0, 2, 0], [3, 5, 0]),
+        line([0, 1, 0], [0, 0, 0.2]),
+    )
     assert abs(klein(first, crossing)) < 1e-15
     np.testing.assert_allclose(abs(klein(first, apart)), 0.2)
     assert klein(first, slide([0, 1, 0])) == 0.0

@@ -125,8 +125,10 @@ def mobility_rows() -> list[Row]:
 def departures(loop: ClampLoop, step: float = 0.003) -> list[tuple[str, float, str]]:
     """Which of the five rates begin a finite motion: distance to the closed set over the step."""
     tangents = loop.tangents(DRAWN)
-    turn = loop.first.screws_at(DRAWN[:5]).T[:3] @ tangents[:5]
-    rest = np.random.default_rng(1).normal(size=tangents.shape[1])
+    moved = loop.first.screws_at(DRAWN[:5]).T @ tangents[:5]
+    turn = moved[:3]
+    # A rate that tilts, yaws and shifts the object alike.
+    rest = np.linalg.pinv(moved) @ np.array([1.0, 0.0, 1.0, 0.2, 0.1, -0.1])
     out = []
     for name, rows, why in (
         ("without tilt", turn[:1], "sheet A: followed"),
