@@ -58,10 +58,10 @@ def test_the_clamp_has_five_freedoms_as_drawn_and_four_elsewhere() -> None:
 
 def test_what_departs_does_not_shrink_with_the_step() -> None:
     loop = zheng.clamp()
-    large, small = ({n: d for n, d, _ in zheng.departures(loop, step)} for step in (0.02, 0.002))
+    large, small = ({n: d for n, d, _ in zheng.departures(loop, step)} for step in (0.05, 0.005))
     for name in ("without tilt", "without yaw"):
         assert small[name] < 0.2 * large[name]
-    assert small["with both"] > 0.5 * large["with both"] > 0.05
+    assert small["with both"] > 0.9 * large["with both"] > 0.09
 
 
 def test_a_loop_that_cannot_close_says_so() -> None:

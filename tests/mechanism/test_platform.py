@@ -188,7 +188,7 @@ def test_bad_input_is_named(standing: Standing, robots: dict[str, Robot]) -> Non
         Platform(platform.chains, {})
     sliding = limb_chain(robots["legarm_hexapod"], "limb1", "limb1_foot")
     loose = Platform({"limb1": sliding}, {"limb1": np.zeros(3)})
-    with pytest.raises(SpecError, match="leg 'limb1' with joints .* no closed form"):
+    with pytest.raises(SpecError, match=r"leg 'limb1' with joints .* no closed form"):
         loose.inverse(pin.SE3.Identity())
     with pytest.raises(SolveError, match=r"m from axis 2, beyond the reach"):
         platform.nearest_joints(mana.pose([0, 0, 0, 0, 0, 100]), home)

@@ -68,7 +68,7 @@ def test_bad_input_is_named(robots: dict[str, Robot]) -> None:
     with pytest.raises(SpecError, match="no frame 'nowhere'"):
         chain_to(robot, "nowhere")
     chain = limb_chain(robot, "leg1")
-    with pytest.raises(SpecError, match="expected 3 finite joint positions .*leg1_hip1"):
+    with pytest.raises(SpecError, match=r"expected 3 finite joint positions .*leg1_hip1"):
         chain.pose([0.0, np.nan, 0.0])
     with pytest.raises(SpecError, match="no joint 'elbow'"):
         chain.hold({"elbow": 0.0})

@@ -99,9 +99,9 @@ def point_leg(chain: Chain, q: ArrayLike, body: pin.SE3) -> StanceLeg:
 def cup_leg(chain: Chain, q: ArrayLike, body: pin.SE3, slides: ArrayLike, torsion: bool = True) -> StanceLeg:
     """A leg on a suction cup, a universal and a prismatic joint (Hex-Piderix): it gives along one direction.
 
-    k is the knee's axis and u the direction of the slide. The wrenches are 1$2, the force along k, and $r, the
-    force along u x k, both through the foot. The printed leg (without `torsion`) has six screws of rank 5 where
-    u is in the leg's plane: k, the slide, tibia and femur are then of one planar group.
+    k is the knee's axis and u the direction of the slide. The wrenches are 1$2, the force along k, and $r,
+    the force along u x k, both through the foot. The printed leg (without `torsion`) has six screws of rank 5
+    where u is in the leg's plane: k, the slide, tibia and femur are then of one planar group.
 
     Args:
         chain: body to foot, joints coxa, femur, tibia.

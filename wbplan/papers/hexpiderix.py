@@ -258,7 +258,8 @@ def drifted(
     Args:
         q: (nq,) configuration.
         twist: (6,) of the body.
-        speed, rise: (9,) rates and accelerations of the stance legs' joints.
+        speed: (9,) rates of the stance legs' joints.
+        rise: (9,) their accelerations.
         seconds: how much later.
     """
     own, (_, names, _) = robot(), legs(q=q)

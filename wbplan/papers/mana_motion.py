@@ -173,13 +173,13 @@ def table_9() -> list[Row]:
                     f"exactly {sign * ours:.4f}",
                 )
             )
-    for label, axis, sign in (("x", 3, 1.0), ("y", 4, 1.0), ("up", 5, 1.0), ("down", 5, -1.0)):
+    for label, index, sign in (("x", 3, 1.0), ("y", 4, 1.0), ("up", 5, 1.0), ("down", 5, -1.0)):
         rows.append(
             row(
                 "section 5.1",
                 f"translation {label} from home",
                 None,
-                farthest(sign * np.eye(6)[axis]),
+                farthest(sign * np.eye(6)[index]),
                 unit="mm",
             )
         )
@@ -255,23 +255,23 @@ def section_5_3() -> list[Row]:
 
 
 def _combined(count: int = 40) -> list[pin.SE3]:
-    """Section 5.3.2 in its feasible reading: half-sines out and back, the translation, then each turn alone."""
+    """Section 5.3.2, feasible reading: half-sines out and back, the translation, then each turn alone."""
     moves = [np.array([0.0, 0.0, 0.0, 40.0, 30.0, 30.0]), *(20.0 * np.eye(6)[k] for k in range(3))]
     share = [math.sin(math.pi * k / count) for k in range(count)]
     return [pose(move * part) for move in moves for part in share] + [pose([0.0] * 6)]
 
 
 def _planned(path: list[pin.SE3], seconds: float, dt: float, stride: int) -> tuple[float, float]:
-    """A path planned as a hard task of the body: worst error of its pose, and of its joints from the closed form.
+    """A path planned as a hard task of the body: worst error of pose, and of joints from the closed form.
 
     Args:
         path: T_world_body at equal intervals.
         seconds: how long it takes.
-        dt: of a tick [s]; the planner linearises each, so joints differ by something of the order of its square.
+        dt: of a tick [s]; the planner linearises each, so joints differ by the order of its square.
         stride: every so many ticks are compared.
     """
     robot = load_robot("mana")
-    platform, home = stance()
+    home = stance()[1]
     q = pin.neutral(robot.model)
     for name, value in home.items():
         q[robot.joint_index(name)[0]] = value
@@ -279,12 +279,12 @@ def _planned(path: list[pin.SE3], seconds: float, dt: float, stride: int) -> tup
     start = robot.state(q)
     standing = Platform.of_robot(robot, start)
     times = np.linspace(0.0, seconds, len(path))
-    way = Waypoints(times, path)
+    way = Waypoints(tuple(times), tuple(path))
     phase = Phase(
         "body",
-        contacts=[Contact(foot, friction=0.7) for foot in robot.feet.values()],
-        hard=[PoseTask("body", way)],
-        limits=[JointLimits()],
+        contacts=tuple(Contact(foot, friction=0.7) for foot in robot.feet.values()),
+        hard=(PoseTask("body", way),),
+        limits=(JointLimits(),),
         duration=seconds,
     )
     motion = plan(robot, Script(phase), start=start, dt=dt).bundle.trajectory
@@ -299,7 +299,7 @@ def _planned(path: list[pin.SE3], seconds: float, dt: float, stride: int) -> tup
 
 
 def figures_8_to_10() -> list[Row]:
-    """The motions of section 5.3, planned tick by tick as hard tasks, beside the closed form (spherical feet)."""
+    """Section 5.3, planned tick by tick as hard tasks, beside the closed form (spherical feet)."""
     turns = [pin.SE3(np.eye(3), p / 1e3) for p in helix(120)]
     rows = []
     for figure, name, path in (("Fig 8", "helix", turns), ("Figs 9, 10", "combined motion", _combined())):

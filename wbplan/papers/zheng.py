@@ -122,7 +122,7 @@ def mobility_rows() -> list[Row]:
     ]
 
 
-def departures(loop: ClampLoop, step: float = 0.003) -> list[tuple[str, float, str]]:
+def departures(loop: ClampLoop, step: float = 0.01) -> list[tuple[str, float, str]]:
     """Which of the five rates begin a finite motion: distance to the closed set over the step."""
     tangents = loop.tangents(DRAWN)
     moved = loop.first.screws_at(DRAWN[:5]).T @ tangents[:5]
