@@ -16,6 +16,7 @@ import pinocchio as pin
 import pytest
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"
+ROBOTS = sorted(script.parent.name for script in URDF.glob("*/generate.py"))
 
 
 @dataclass(frozen=True)
@@ -99,13 +100,40 @@ class Machine:
             if result.isCollision()
         }
 
+    @cached_property
+    def checked(self) -> pin.GeometryModel:
+        """Collision shapes with the pairs of links that a planner would check."""
+        return self.solids_with(set(self.disabled()), keep=False)
+
     def link_of(self, geometry: pin.GeometryObject) -> str:
         return str(self.model.frames[geometry.parentFrame].name)
 
 
 @pytest.fixture(scope="session")
-def legarm() -> Machine:
-    return Machine("legarm_hexapod")
+def machines() -> dict[str, Machine]:
+    """Every robot that ships, each read once."""
+    return {name: Machine(name) for name in ROBOTS}
+
+
+@pytest.fixture(scope="session", params=ROBOTS)
+def machine(request: pytest.FixtureRequest, machines: dict[str, Machine]) -> Machine:
+    """One after the other."""
+    return machines[request.param]
+
+
+@pytest.fixture(scope="session")
+def legarm(machines: dict[str, Machine]) -> Machine:
+    return machines["legarm_hexapod"]
+
+
+@pytest.fixture(scope="session")
+def heavy(machines: dict[str, Machine]) -> Machine:
+    return machines["heavy_hexapod"]
+
+
+@pytest.fixture(scope="session")
+def hiphant(machines: dict[str, Machine]) -> Machine:
+    return machines["hiphant"]
 
 
 @pytest.fixture(scope="session")
