@@ -150,7 +150,8 @@ def test_three_legs_hold_robot_and_load(robot):
 
 def test_it_sways_under_the_papers_load(robot, heavy):
     here = robot.state("stand").pose("body")
-    load = wb.Body("load", mass=LOAD / GRAVITY, size=(0.4, 0.4, 0.3), com=(0.0, 0.0, 0.15))
+    load = wb.Body("load", mass=LOAD / GRAVITY, size=(0.4, 0.4, 0.3))
+    on_deck = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.15]))
 
     def at(xyz, rpy):
         return pin.SE3(pin.exp3(np.radians(rpy)), here.translation + np.array(xyz))
@@ -159,7 +160,7 @@ def test_it_sways_under_the_papers_load(robot, heavy):
     phase = wb.Phase(
         "sway",
         contacts=[wb.Contact(foot, friction=0.6) for foot in robot.feet.values()],
-        carried=[wb.Carried(load, by="deck")],
+        carried=[wb.Carried(load, by="deck", pose=on_deck)],
         soft=[
             wb.PoseTask("body", wb.Waypoints((0.0, 1.0, 2.0, 3.0), way), weight=20.0),
             wb.PostureTask(weight=0.01),

@@ -58,7 +58,7 @@ def test_45_kg_of_which_10_are_the_arm(hiphant):
 
 def test_twelve_modules_of_2_3_kg_are_in_the_platform(hiphant, run_script):
     # Each is a part of that mass in the link that carries it: four in the torso, two in every leg.
-    legs = run_script("hiphant/hiphant_legs.py")
+    legs = run_script("hiphant/generate.py")
     links = [legs.body(), *(make(leg) for leg in LEGS for make in (legs.hip, legs.thigh, legs.shank))]
     counts = {link.name: sum(part.mass == 2.3 for part in link.parts) for link in links}
     assert sum(counts.values()) == 12
