@@ -10,7 +10,6 @@ the same time law, so that a path of equal end points never swings around them.
 from __future__ import annotations
 
 import abc
-from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, final
@@ -18,9 +17,9 @@ from typing import Any, Final, final
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from wbplan.errors import SpecError
+from wbplan.splines import Spline
 
 Array = NDArray[np.float64]
 Value = Any  # pin.SE3 or Array: pinocchio ships no types
@@ -291,7 +290,7 @@ class Waypoints(Path):
 
     times: tuple[float, ...]
     points: tuple[Value, ...]
-    spline: _Spline | None = field(init=False, repr=False, default=None)
+    spline: Spline | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         for name in ("times", "points"):
@@ -309,7 +308,7 @@ class Waypoints(Path):
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "points", points)
         if not any(p is AS_IS for p in points):
-            object.__setattr__(self, "spline", _Spline(times, points))
+            object.__setattr__(self, "spline", Spline(times, points))
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`."""
@@ -321,60 +320,6 @@ class Waypoints(Path):
     def at(self, t: float) -> Value:
         """See `Path.at`."""
         return _blend(AS_IS, AS_IS, t) if self.spline is None else self.spline(t)
-
-
-@final
-class _Spline:
-    """The clamped cubic spline through points of one kind.
-
-    Attributes:
-        first: the first point, in whose tangent space rotations are splined.
-    """
-
-    def __init__(self, times: tuple[float, ...], points: tuple[Value, ...]) -> None:
-        self.first, self._times = points[0], times
-        if isinstance(self.first, pin.SE3):
-            turns = _rotation_vectors([p.rotation for p in points])
-            rows = np.column_stack([[p.translation for p in points], turns])
-        else:
-            rows = _rotation_vectors(points) if self.first.shape == (3, 3) else np.array(points)
-        self._curve = CubicSpline(np.array(times), rows, bc_type="clamped")
-        self._pieces = [tuple(self._curve.c[:, i]) for i in range(len(times) - 1)]
-
-    def rows(self, times: Array) -> Array:
-        """(N, ...) coordinates at times (N,) [s]: of a pose, its origin and its rotation vector."""
-        rows: Array = self._curve(np.clip(times, 0.0, self._times[-1]))
-        return rows
-
-    def __call__(self, t: float) -> Value:
-        t = min(max(t, 0.0), self._times[-1])
-        piece = min(bisect_right(self._times, t), len(self._pieces)) - 1
-        a, b, c, d = self._pieces[piece]
-        s = t - self._times[piece]
-        row = ((a * s + b) * s + c) * s + d
-        if isinstance(self.first, pin.SE3):
-            return pin.SE3(self.first.rotation @ pin.exp3(row[3:]), row[:3])
-        return self.first @ pin.exp3(row) if self.first.shape == (3, 3) else row
-
-
-def _rotation_vectors(rotations: Sequence[Array]) -> Array:
-    """(N, 3) [rad], about the axes of the first rotation; each the one nearest to that before it.
-
-    A rotation by `angle` about `axis` is one by `angle + 2 pi k` too.
-    """
-    vectors = [np.zeros(3)]
-    for i, rotation in enumerate(rotations[1:], 1):
-        if np.linalg.norm(pin.log3(rotations[i - 1].T @ rotation)) > np.pi - 1e-6:
-            raise SpecError(
-                f"Waypoints.points[{i}]: turned by half a turn against points[{i - 1}], so that the way "
-                "round is open; put a point between"
-            )
-        vector = pin.log3(rotations[0].T @ rotation)
-        angle = float(np.linalg.norm(vector))
-        axis = vector / angle if angle > 1e-9 else vectors[-1] / max(float(np.linalg.norm(vectors[-1])), 1e-9)
-        vector = vector + axis * 2.0 * np.pi * np.round((vectors[-1] - vector) @ axis / (2.0 * np.pi))
-        vectors.append(vector)
-    return np.array(vectors)
 
 
 @final

@@ -27,7 +27,7 @@ class Retraction:
         self._stack = stack
 
     def correct(self, q: Array, new: Array, kept: Callable[[], bool], *, recovering: bool) -> Array:
-        """Correct `new`, which a step from `q` led to, at most a few times; the stack then measures the result.
+        """Correct `new`, which a step from `q` led to, a few times at most; the stack measures the result.
 
         Args:
             q: (nq,) where the tick started.
@@ -71,8 +71,15 @@ class Retraction:
         qp.settings.eps_abs = 1e-9
         qp.settings.primal_infeasibility_solving = True
         qp.init(
-            np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, np.full(edges, -1e20), stack.d,
-            np.minimum(lower, 0.0), np.maximum(upper, 0.0),
+            np.eye(n),
+            np.zeros(n),
+            stack.A,
+            stack.b,
+            stack.C,
+            np.full(edges, -1e20),
+            stack.d,
+            np.minimum(lower, 0.0),
+            np.maximum(upper, 0.0),
         )
         qp.solve()
         x = np.array(qp.results.x)

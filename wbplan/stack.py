@@ -42,7 +42,9 @@ def reach(model: Any, frame: int) -> float:
     if frame == WORLD:
         return 0.0
     joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [model.frames[frame].placement.translation]
+    links = [model.jointPlacements[j].translation for j in joints] + [
+        model.frames[frame].placement.translation
+    ]
     return float(sum(np.linalg.norm(link) for link in links))
 
 
@@ -61,7 +63,7 @@ class Stack:
         damping: what stands on the whole diagonal of H, at the last `assemble`.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
-        postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones; hard_joint_goal: their targets.
+        postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
 
     def __init__(self, phase: CompiledPhase, dt: float) -> None:
@@ -101,7 +103,11 @@ class Stack:
         rows, nf = self.rows, len(self.free)
         soft = slice(rows.hard, len(rows.error))
         count = len(rows.error) - rows.hard
-        self._weight, self._soft_error, self._soft_motion = rows.weight[soft], rows.error[soft], rows.motion[soft]
+        self._weight, self._soft_error, self._soft_motion = (
+            rows.weight[soft],
+            rows.error[soft],
+            rows.motion[soft],
+        )
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
         self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
@@ -127,7 +133,7 @@ class Stack:
         )  # fmt: skip
 
     def _levers(self, soft: slice) -> Array:
-        """Bound on the curvature of each soft row's error, per unit of error: lever arm [m], or 1 for a rotation."""
+        """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
         for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
@@ -176,7 +182,7 @@ class Stack:
             posture.aim(t)
 
     def advance(self, t: float) -> None:
-        """Move all targets on from time `t` [s] by a tick, keeping how far each goes, and so the driven joints."""
+        """Move all targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
         self.rows.advance(t, self.dt)
         t += self.dt
         for posture in self.postures:

@@ -33,7 +33,7 @@ from wbplan.state import State
 
 Array = NDArray[np.float64]
 
-#: A hard row further off than this [m or rad] after all correction breaks its promise (the checks allow 1e-4 m).
+#: A hard row further off than this [m or rad] after all correction breaks its promise; the checks allow 1e-4.
 PROMISE = 5e-5
 
 #: A multiplier below this share of the soft tasks' pull does not count as holding the robot back.
@@ -48,7 +48,7 @@ class Active:
     Attributes:
         name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
         kind: 'position', 'speed', 'margin' or 'hard'.
-        multiplier: its Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver gives none.
+        multiplier: Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver has none.
     """
 
     name: str
@@ -71,10 +71,30 @@ class Tick:
         warning: '' or why a promise is not yet kept, as 'margin not yet reached'.
     """
 
-    __slots__ = ("__dict__", "_loop", "_solution", "_stamp", "com", "margin", "microseconds", "q", "t", "v", "warning")
+    __slots__ = (
+        "__dict__",
+        "_loop",
+        "_solution",
+        "_stamp",
+        "com",
+        "margin",
+        "microseconds",
+        "q",
+        "t",
+        "v",
+        "warning",
+    )
 
     def __init__(
-        self, loop: Loop, t: float, q: Array, v: Array, com: Array, margin: float, solution: Solution, seconds: float
+        self,
+        loop: Loop,
+        t: float,
+        q: Array,
+        v: Array,
+        com: Array,
+        margin: float,
+        solution: Solution,
+        seconds: float,
     ) -> None:
         self._loop, self._solution, self._stamp = loop, solution, loop.count
         self.t, self.q, self.v, self.com, self.margin = t, q, v, com, margin
@@ -157,7 +177,8 @@ class Loop:
                 need = self.compiled.phase.duration * rates.max() / speed[d.joint]
                 raise SpecError(
                     f"phase '{self.compiled.phase.name}': joint '{names[d.joint]}' would have to move at "
-                    f"{rates.max():.3g}, its limit is {speed[d.joint]:.3g}; give the phase {need:.2g} s or more"
+                    f"{rates.max():.3g}, its limit is {speed[d.joint]:.3g}; "
+                    f"give the phase {need:.2g} s or more"
                 )
 
     @property
@@ -215,8 +236,8 @@ class Loop:
             raise self._off(q, *stack.hard_names()[worst], abs(float(stack.hard_error[worst])))
         if not self._margin_kept(before):
             raise SolveError(
-                f"phase '{self.compiled.phase.name}': the step leaves a stability margin of {stack.margin:.5f} m, "
-                f"{self.compiled.margin} m is promised; move slower or use a smaller dt"
+                f"phase '{self.compiled.phase.name}': the step leaves a stability margin of "
+                f"{stack.margin:.5f} m, {self.compiled.margin} m is promised; move slower or use a smaller dt"
             )
         return new
 
@@ -283,5 +304,7 @@ class Loop:
         promised, polygon = self.compiled.margin, self.compiled.polygon
         if polygon is not None and promised is not None:
             room = polygon.offsets - polygon.normals @ stack.kinematics.com[:2] - promised
-            found += [Active(stack.edge_names()[k], "margin", float("nan")) for k in np.flatnonzero(room < 2e-4)]
+            found += [
+                Active(stack.edge_names()[k], "margin", float("nan")) for k in np.flatnonzero(room < 2e-4)
+            ]
         return found

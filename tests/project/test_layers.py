@@ -12,6 +12,7 @@ LAYERS = [
     "errors",
     "version",
     "geometry",
+    "splines",
     "paths",
     "state",
     "catalog",

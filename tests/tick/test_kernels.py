@@ -53,7 +53,9 @@ PATHS = {
     "line": wb.Line(pose(0, 1, 0, 0.2, 0, 0), pose(1, 0, 0, 0, 0.4, 0), 2.0),
     "swing": wb.Swing(np.zeros(3), np.array([0.2, 0.1, 0.0]), 0.05, 0.8),
     "swing of poses": wb.Swing(pose(0, 0, 0, 0, 0, 0), pose(0.1, 0, 0, 0, 0, 0.5), 0.05, 0.8),
-    "waypoints": wb.Waypoints((0, 1, 2), (pose(0, 0, 0, 0, 0, 0), pose(1, 0, 0, 0, 1, 0), pose(0, 1, 0, 2, 0, 0))),
+    "waypoints": wb.Waypoints(
+        (0, 1, 2), (pose(0, 0, 0, 0, 0, 0), pose(1, 0, 0, 0, 1, 0), pose(0, 1, 0, 2, 0, 0))
+    ),
     "waypoints of points": wb.Waypoints((0, 1, 2), (np.zeros(3), np.ones(3), np.array([0.0, 1.0, -1.0]))),
     "waypoints of rotations": wb.Waypoints((0, 1), (np.eye(3), pin.exp3(np.array([0.0, 0.5, 0.0])))),
     "hold": wb.Hold(pose(1, 2, 3, 0.1, 0.2, 0.3)),
@@ -80,7 +82,9 @@ def clamp_like(robot: wb.Robot) -> wb.Phase:
     """Loop, polygon and targets that run into joint limits and out again."""
     start = robot.state("manipulate")
     out = start.pose("body").translation + np.array([0.06, 0.1, -0.08])
-    tour = wb.Waypoints((0.0, 1.0, 2.0), (wb.AS_IS, pin.SE3(pin.exp3(np.array([0.2, 0.0, 0.3])), out), wb.AS_IS))
+    tour = wb.Waypoints(
+        (0.0, 1.0, 2.0), (wb.AS_IS, pin.SE3(pin.exp3(np.array([0.2, 0.0, 0.3])), out), wb.AS_IS)
+    )
     return wb.Phase(
         "tour",
         contacts=[wb.Contact(f"leg{i}_foot") for i in (3, 4, 5, 6)],
@@ -95,9 +99,7 @@ def asked_of_proxqp(stack: Stack) -> proxsuite.proxqp.Results:
     n, m, e = len(stack.g), len(stack.b), len(stack.d)
     qp = proxsuite.proxqp.dense.QP(n, m, e, True)
     qp.settings.eps_abs, qp.settings.eps_rel = 1e-11, 0.0
-    qp.init(
-        stack.H, stack.g, stack.A, stack.b, stack.C, np.full(e, -1e20), stack.d, stack.lower, stack.upper
-    )
+    qp.init(stack.H, stack.g, stack.A, stack.b, stack.C, np.full(e, -1e20), stack.d, stack.lower, stack.upper)
     qp.solve()
     return qp.results
 

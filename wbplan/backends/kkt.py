@@ -135,4 +135,6 @@ class ActiveSetGuess:
         """Take over the active bounds of a solver's multipliers, (nf,) and (E,)."""
         np.sign(np.where(np.abs(box) > ROUNDING, box, 0.0), out=self._sides, casting="unsafe")
         np.greater(edges, ROUNDING, out=self._edges)
-        self._size = len(self._stack.g) + len(self._stack.b) + int(np.abs(self._sides).sum() + self._edges.sum())
+        self._size = (
+            len(self._stack.g) + len(self._stack.b) + int(np.abs(self._sides).sum() + self._edges.sum())
+        )

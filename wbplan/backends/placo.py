@@ -21,7 +21,7 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, ComTarget, CompiledPhase, FrameTarget
+from wbplan.compiled import WORLD, CompiledPhase, ComTarget, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.qp import Solution
@@ -100,7 +100,9 @@ class PlacoBackend:
             if axes != "xyz":
                 task.mask.set_axises(axes, "task")
             part = "rotation" if rotation else "position"
-            task.configure(f"{target.label} {part} {axes}", *self._priority(target.label, target.hard, weight))
+            task.configure(
+                f"{target.label} {part} {axes}", *self._priority(target.label, target.hard, weight)
+            )
             tasks.append(task)
         return tasks
 
@@ -159,7 +161,9 @@ class PlacoBackend:
         solver.enable_joint_limits(limits is not None)
         solver.enable_velocity_limits(limits is not None)
         if limits is not None:
-            given = {driven.joint for driven in phase.driven}  # a given motion may use all of the URDF's speed
+            given = {
+                driven.joint for driven in phase.driven
+            }  # a given motion may use all of the URDF's speed
             for j, name in enumerate(phase.robot.joint_names):
                 share = 1.0 + 1e-6 if j in given else limits.speed
                 robot.set_velocity_limit(name, float(share * phase.model.velocityLimit[6 + j]))
@@ -171,7 +175,7 @@ class PlacoBackend:
             self._polygon.configure("support polygon", "hard", 1.0)
 
     def _admit_outsiders(self) -> None:
-        """A joint outside its limits may stay as far out as a tick at full speed leaves it, and no farther."""
+        """A joint outside its limits may stay as far out as a tick at full speed leaves it."""
         model, q, dt = self._stack.phase.model, self._stack.kinematics.q, self._stack.dt
         low, high = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
         outside = set(np.flatnonzero((q[7:] < low) | (q[7:] > high)).tolist())
@@ -240,7 +244,7 @@ class PlacoBackend:
                     task.R_a_b = rotation
         for k, lag, task in self._coms:
             task.target_world = rows.com_goal[k] - lag * rows.com_error[k]
-        joints = stack.kinematics.q[stack.q_index] if self._postures else None
+        joints = stack.kinematics.q[stack.q_index]
         for task, names, columns, posture in self._postures:
             goals = posture.next_goal(joints)[columns].tolist()
             for name, goal in zip(names, goals, strict=True):
@@ -258,7 +262,6 @@ class PlacoBackend:
     def _sort_frame_tasks(self) -> None:
         """Put what never moves in its place for good; list the rest by what `_aim` has to do."""
         rows = self._stack.rows
-        still = lambda target: target.hard and target.path.constant  # noqa: E731
         self._moving_places: list[tuple[int, Any]] = []
         self._moving_relative_places: list[tuple[int, Any]] = []
         self._moving_turns: list[tuple[int, float, bool, list[Any]]] = []
@@ -266,20 +269,25 @@ class PlacoBackend:
             world = target.root == WORLD
             for task in self._frame_tasks(target, rotation=False):
                 setattr(task, "target_world" if world else "target", rows.position_goal[k].copy())
-                if not still(target):
+                if not _rests(target):
                     (self._moving_places if world else self._moving_relative_places).append((k, task))
         for k, target in enumerate(rows.rotation_targets):
             world = target.root == WORLD
             tasks = self._frame_tasks(target, rotation=True)
             for task in tasks:
                 setattr(task, "R_world_frame" if world else "R_a_b", rows.rotation_goal[k].copy())
-            if not still(target):
+            if not _rests(target):
                 self._moving_turns.append((k, self._lag(target), world, tasks))
         self._position_lag = np.array([[self._lag(t)] for t in rows.position_targets]).reshape(-1, 1)
 
     def _lag(self, target: FrameTarget | ComTarget) -> float:
         """The share of a soft target's error that a tick leaves."""
         return 0.0 if target.hard else float(np.exp(-target.gain * self._stack.dt))
+
+
+def _rests(target: FrameTarget) -> bool:
+    """Whether PlaCo needs to be told a target only once."""
+    return target.hard and target.path.constant
 
 
 def _dependent(stack: Stack) -> set[str]:
@@ -298,7 +306,7 @@ def _dependent(stack: Stack) -> set[str]:
 def _urdf_with_carried(phase: CompiledPhase) -> str:
     """The URDF without its looks, and with each carried body as a link fixed to its holder."""
     root = etree.fromstring(phase.robot.urdf_text.encode(), etree.XMLParser(resolve_entities=False))
-    for element in [e for e in root.iter("visual", "collision")]:
+    for element in list(root.iter("visual", "collision")):
         element.getparent().remove(element)
     for held in phase.held:
         xyz = " ".join(repr(float(x)) for x in held.T_holder_body.translation)
