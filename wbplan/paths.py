@@ -96,15 +96,12 @@ def number(
 ) -> float:
     """A finite number, `least` or more and more than `above`; refused with a `SpecError` if it is not."""
     scalar = numeric(value)
-    if (
-        scalar is not None
-        and scalar.shape == ()
-        and np.isfinite(scalar)
-        and scalar >= least
-        and scalar > above
-    ):
-        return float(scalar)
-    raise SpecError(f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}")
+    found = float(scalar) if scalar is not None and scalar.shape == () else np.nan
+    if not (np.isfinite(found) and found >= least and found > above):
+        raise SpecError(
+            f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}"
+        )
+    return found
 
 
 def name_of(value: object, what: str) -> str:
@@ -127,20 +124,15 @@ def _start(here: Value, kind: str | None) -> Value:
     return here.rotation if kind == ROTATION and isinstance(here, pin.SE3) else here
 
 
-def _turned(start: Array, goal: Array, s: float) -> Array:
-    turned: Array = start @ pin.exp3(s * pin.log3(start.T @ goal))
-    return turned
-
-
 def _blend(start: Value, goal: Value, s: float) -> Value:
     """The point a fraction `s` of the way from `start` to `goal`."""
     if start is AS_IS or goal is AS_IS:
         raise SpecError("a path from or to AS_IS has a value only once its phase begins (or after `bind`)")
     if isinstance(start, pin.SE3):
         along = (1.0 - s) * start.translation + s * goal.translation
-        return pin.SE3(_turned(start.rotation, goal.rotation, s), along)
+        return pin.SE3(_blend(start.rotation, goal.rotation, s), along)
     if start.shape == (3, 3):
-        return _turned(start, goal, s)
+        return start @ pin.exp3(s * pin.log3(start.T @ goal))
     return start + s * (goal - start)
 
 
@@ -149,7 +141,6 @@ class Path(abc.ABC):
 
     #: Whether the value may change between two calls with the same time (only `Live`).
     live: bool = False
-
     #: What its values are, in the words of messages; `None` where that is not known before `bind`.
     kind: str | None = None
 

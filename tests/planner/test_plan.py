@@ -320,7 +320,7 @@ def test_a_tick_that_does_not_divide_the_duration_is_rounded_up(
     assert plan.check().ok
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.27, 0.5])
+@pytest.mark.parametrize("dt", [0.01, 0.27, 0.5, 2.0])
 def test_progress_grows_and_ends_at_one(legarm: wb.Robot, dt: float) -> None:
     phases = [wb.Phase(name, contacts=on(), duration=0.5) for name in ("one", "two", "three")]
     seen: list[tuple[float, str]] = []
