@@ -10,7 +10,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
-from wbplan.compiled import WORLD
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop, Tick
@@ -75,8 +74,8 @@ class Recorder:
         self._margin.append(stack.margin)
         self._phase.append(index)
         self._errors.append(stack.errors())
-        self._targets.append(_targets(loop))
-        self._bodies.append({**self._placed, **_held(loop)})
+        self._targets.append(loop.targets())
+        self._bodies.append({**self._placed, **loop.bodies()})
 
     def end(self, index: int, loop: Loop, elapsed: float) -> None:
         """A phase is over: its entry in plan.json."""
@@ -167,26 +166,3 @@ def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:
         for name, value in sample.items():
             columns[name][k] = value
     return columns
-
-
-def _targets(loop: Loop) -> dict[str, Array]:
-    """World poses asked for now, by task; a point's orientation is the world's."""
-    found = {}
-    for target in loop.compiled.frame_targets:
-        if target.root != WORLD or target.label.startswith("contact("):
-            continue
-        value = target.path.at(loop.t)
-        if not isinstance(value, pin.SE3):
-            if np.shape(value) != (3,):
-                continue
-            value = pin.SE3(np.eye(3), np.asarray(value))
-        found[target.label] = pin.SE3ToXYZQUAT(value)
-    return found
-
-
-def _held(loop: Loop) -> dict[str, Array]:
-    compiled = loop.compiled
-    if not compiled.held:
-        return {}
-    oMf = loop.stack.kinematics.data.oMf
-    return {h.body.name: pin.SE3ToXYZQUAT(oMf[h.frame]) for h in compiled.held}

@@ -21,7 +21,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.backends import make_backend
-from wbplan.compiled import CompiledPhase, compile_phase
+from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError
 from wbplan.qp import Solution
@@ -185,6 +185,28 @@ class Loop:
     def margin(self) -> float:
         """Stability margin now [m]."""
         return self.stack.margin
+
+    def targets(self) -> dict[str, Array]:
+        """Pose (7,) x y z qx qy qz qw in the world that each task on a frame asks for now, by task.
+
+        A point that is asked for has the world's orientation; tasks in another root are left out.
+        """
+        found = {}
+        for target in self.compiled.frame_targets:
+            if target.root != WORLD or target.label.startswith("contact("):
+                continue
+            value = target.path.at(self.t)
+            if not isinstance(value, pin.SE3):
+                if np.shape(value) != (3,):
+                    continue
+                value = pin.SE3(np.eye(3), np.asarray(value))
+            found[target.label] = pin.SE3ToXYZQUAT(value)
+        return found
+
+    def bodies(self) -> dict[str, Array]:
+        """Pose (7,) x y z qx qy qz qw in the world of each carried body now, by name."""
+        places = self.stack.kinematics.data.oMf
+        return {h.body.name: pin.SE3ToXYZQUAT(places[h.frame]) for h in self.compiled.held}
 
     def step(self, t: float | None = None) -> Tick:
         """Move on by one tick, from time `t` [s] of the phase (by default where the last one ended).

@@ -303,6 +303,24 @@ def test_a_loop_closed_by_way_of_the_box_is_a_closure_of_its_holder(legarm: wb.R
     assert plan.check().ok
 
 
+def test_a_role_once_taken_is_kept(legarm: wb.Robot) -> None:
+    change = wb.Phase("change", contacts=on(), roles={"limb1": "arm"}, soft=[wb.PostureTask()], duration=1.4)
+    after = wb.Phase("after", contacts=on(), soft=[wb.PostureTask()], duration=0.1)
+    plan = wb.plan(legarm, wb.Script(change, after), dt=0.02)
+    assert plan.check().ok
+    assert [p["roles"] for p in plan.bundle.phases] == [{"limb1": "arm", "limb2": "leg"}] * 2
+    q = plan.trajectory.q
+    for joint, value in legarm.roles["limb1"]["arm"].items():
+        index = legarm.joint_index(joint)[0]
+        np.testing.assert_allclose(q[70:, index], value, atol=1e-9)
+    shank = q[:, legarm.joint_index("limb1_shank2")[0]]
+    assert shank[0] == pytest.approx(0.07)
+    assert (np.diff(shank) <= 1e-12).all()
+    on_it = wb.Phase("on it", contacts=on(("limb1_foot", *FOUR)), duration=0.1)
+    with pytest.raises(wb.SpecError, match="phase 'on it': contact 'limb1_foot' needs limb1 in role 'leg'"):
+        wb.plan(legarm, wb.Script(change, after, on_it), dt=0.02)
+
+
 # -------------------------------------------------------------------------------------- dt and progress
 
 
