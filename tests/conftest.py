@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from wbplan.bundle import Bundle
+
 # The same examples each time: a red run can be run again, and a slow machine is no failure.
 settings.register_profile("wbplan", deadline=None, derandomize=True)
 settings.load_profile("wbplan")
@@ -16,3 +18,20 @@ settings.load_profile("wbplan")
 def root() -> Path:
     """The repository's folder."""
     return Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def machine() -> ModuleType:
+    """A small four-legged robot and plans of it, for the tests of bundle, checks and plots."""
+    spec = spec_from_file_location("machine", Path(__file__).parent / "bundle" / "machine.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def good(machine: ModuleType) -> Bundle:
+    """A plan that keeps every promise."""
+    return machine.build()
