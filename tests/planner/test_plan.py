@@ -264,6 +264,24 @@ def test_a_grip_that_is_given_is_the_grip(legarm: wb.Robot) -> None:
     assert plan.check().ok
 
 
+def test_a_body_does_not_jump_into_its_holder(legarm: wb.Robot) -> None:
+    tip = legarm.state("manipulate").pose("limb1_tip")
+    grip = pin.SE3(np.eye(3), np.array([0.05, 0.0, 0.0]))
+    for place, says in (
+        (tip * up(grip, 0.0, 0.002, 0.0), r"0\.002 m and \S+ rad from where the body is"),
+        (
+            tip * grip * pin.SE3(pin.exp3(np.array([0.0, 0.003, 0.0])), np.zeros(3)),
+            r"m and 0\.003 rad from where",
+        ),
+    ):
+        item = wb.Carried(wb.Body("box", mass=0.1, pose=place), by="limb1_tip", pose=grip)
+        with pytest.raises(wb.SpecError, match=rf"phase 'hold'\.carried: body 'box'\.pose: {says}"):
+            wb.plan(legarm, wb.Phase("hold", contacts=on(), carried=[item]), start="manipulate")
+    there = wb.Carried(wb.Body("box", mass=0.1, pose=tip * grip), by="limb1_tip", pose=grip)
+    phases = [wb.Phase(name, contacts=on(), carried=[there], duration=0.05) for name in ("one", "two")]
+    assert wb.plan(legarm, wb.Script(phases), start="manipulate").check().ok
+
+
 def test_a_body_passed_on_keeps_its_place(legarm: wb.Robot) -> None:
     """From one hand to the other: the second takes it as it is."""
     box = wb.Body("box", mass=0.1, pose=legarm.state("manipulate").pose("limb1_tip"))
