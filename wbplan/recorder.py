@@ -33,6 +33,7 @@ class Recorder:
         self._margin: list[float] = []
         self._phase: list[int] = []
         self._errors: list[dict[str, float]] = []
+        self._worst: dict[str, float] = {}
         self._targets: list[dict[str, Array]] = []
         self._bodies: list[dict[str, Array]] = []
         self._microseconds: list[float] = []
@@ -73,7 +74,10 @@ class Recorder:
         self._com.append(stack.kinematics.com.copy())
         self._margin.append(stack.margin)
         self._phase.append(index)
-        self._errors.append(stack.errors())
+        errors = stack.errors()
+        self._errors.append(errors)
+        for name, error in errors.items():
+            self._worst[name] = max(error, self._worst.get(name, 0.0))
         self._targets.append(loop.targets())
         self._bodies.append({**self._placed, **loop.bodies()})
 
@@ -140,7 +144,7 @@ class Recorder:
             "ticks": len(microseconds),
             "median_us": float(np.median(microseconds)),
             "p99_us": float(np.percentile(microseconds, 99)),
-            "worst": {name: float(np.nanmax(column)) for name, column in trajectory.errors.items()},
+            "worst": dict(self._worst),
             "warnings": list(dict.fromkeys(self._warnings)),
         }
         plan = {

@@ -14,6 +14,8 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, final
 
 import numpy as np
@@ -233,6 +235,11 @@ class Stack:
             margin + MARGIN_RESERVE, least, self.C, self.d,
         )  # fmt: skip
 
+    def distances(self) -> Array:
+        """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
+        gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
+        return gaps
+
     def fill_box(self) -> None:
         """Fill lower and upper for the current configuration."""
         kernels.box(
@@ -293,12 +300,22 @@ class Stack:
 
         Keys: '<label>.position' [m], '<label>.orientation' [rad], '<label>.joints' [rad].
         """
-        error, joints = self.rows.error, self.kinematics.q[self.q_index]
+        return self.keep_errors()()
+
+    def keep_errors(self) -> Callable[[], dict[str, float]]:
+        """`errors` of this moment, to be worked out whenever somebody asks."""
+        joints = self.kinematics.q[self.q_index]
+        return partial(
+            self._name_errors, self.rows.error.copy(), self.hard_error[self.rows.hard :].copy(),
+            self._posture_goal - joints,
+        )  # fmt: skip
+
+    def _name_errors(self, error: Array, hard_joints: Array, postures: Array) -> dict[str, float]:
         found = {f"{label}.{part}": _norm(error[span]) for label, part, span in self.rows.labels}
-        for posture in self.postures:
-            found[f"{posture.label}.joints"] = _norm((posture.goal - joints)[posture.stiffness > 0])
-        for i, (_, _, label) in enumerate(self.hard_joints):
-            key, gap = f"{label}.joints", float(self.hard_error[self.rows.hard + i])
+        for posture, gap in zip(self.postures, postures, strict=True):
+            found[f"{posture.label}.joints"] = _norm(gap[posture.stiffness > 0])
+        for (_, _, label), gap in zip(self.hard_joints, hard_joints, strict=True):
+            key = f"{label}.joints"
             found[key] = float(np.hypot(found.get(key, 0.0), gap))
         return found
 

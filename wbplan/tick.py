@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
 
@@ -20,11 +19,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbplan.active import Active, HeldBack
 from wbplan.backends import make_backend
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError
-from wbplan.qp import Solution
 from wbplan.retract import DRIFT, Retraction
 from wbplan.robot import Robot
 from wbplan.script import Phase
@@ -35,28 +34,6 @@ Array = NDArray[np.float64]
 
 #: A hard row further off than this [m or rad] after all correction breaks its promise; the checks allow 1e-4.
 PROMISE = 5e-5
-
-#: A multiplier below this share of the soft tasks' pull does not count as holding the robot back.
-FAINT = 1e-3
-
-
-@final
-@dataclass(frozen=True)
-class Active:
-    """A limit or hard row that holds the robot back.
-
-    Attributes:
-        name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
-        kind: 'position', 'speed', 'margin' or 'hard'.
-        multiplier: Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver has none.
-    """
-
-    name: str
-    kind: str
-    multiplier: float
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.kind})"
 
 
 @final
@@ -73,9 +50,8 @@ class Tick:
 
     __slots__ = (
         "__dict__",
-        "_loop",
-        "_solution",
-        "_stamp",
+        "_errors",
+        "_held_back",
         "com",
         "margin",
         "microseconds",
@@ -85,28 +61,16 @@ class Tick:
         "warning",
     )
 
-    def __init__(
-        self,
-        loop: Loop,
-        t: float,
-        q: Array,
-        v: Array,
-        com: Array,
-        margin: float,
-        solution: Solution,
-        seconds: float,
-    ) -> None:
-        self._loop, self._solution, self._stamp = loop, solution, loop.count
-        self.t, self.q, self.v, self.com, self.margin = t, q, v, com, margin
-        self.microseconds = 1e6 * seconds
+    def __init__(self, loop: Loop, v: Array, held_back: HeldBack, started: float) -> None:
+        stack = loop.stack
+        self.t, self.q, self.v = loop.t, loop.q, v
+        self.com, self.margin = stack.kinematics.com.copy(), stack.margin
+        self._errors, self._held_back = stack.keep_errors(), held_back
         promised = loop.compiled.margin
         self.warning = ""
-        if promised is not None and margin < promised - 1e-6:
-            self.warning = f"margin not yet reached: {margin:.4f} m of {promised:.4f} m"
-
-    def _fresh(self, what: str) -> None:
-        if self._stamp != self._loop.count:
-            raise SpecError(f"tick.{what}: read it before the loop's next step")
+        if promised is not None and self.margin < promised - 1e-6:
+            self.warning = f"margin not yet reached: {self.margin:.4f} m of {promised:.4f} m"
+        self.microseconds = 1e6 * (time.perf_counter() - started)
 
     @cached_property
     def errors(self) -> Mapping[str, float]:
@@ -114,14 +78,12 @@ class Tick:
 
         Keys: '<task>.position' [m], '<task>.orientation' [rad], '<task>.joints' [rad].
         """
-        self._fresh("errors")
-        return self._loop.stack.errors()
+        return self._errors()
 
     @cached_property
     def active(self) -> tuple[Active, ...]:
         """Limits and hard rows that held the robot back in this step, the strongest first."""
-        self._fresh("active")
-        return self._loop.active(self._solution)
+        return self._held_back.named()
 
 
 @final
@@ -155,7 +117,7 @@ class Loop:
         if not (np.isfinite(dt) and dt > 0.0):
             raise SpecError(f"dt: expected a positive number of seconds, got {dt}")
         start = State(robot.model, state.q if isinstance(state, State) else state)
-        self.dt, self.t, self.count = float(dt), 0.0, 0
+        self.dt, self.t = float(dt), 0.0
         self.compiled: CompiledPhase = compile_phase(robot, phase, start.q, placed, roles)
         self.stack = Stack(self.compiled, self.dt)
         self.q: Array = np.array(start.q)
@@ -235,11 +197,9 @@ class Loop:
             stack.aim(self.t)
             stack.measure(q)
             raise
-        v = pin.difference(self.compiled.model, q, new) / self.dt
         self.q, self.t = new, ends
-        self.count += 1
-        com = stack.kinematics.com.copy()
-        return Tick(self, ends, new, v, com, stack.margin, solution, time.perf_counter() - started)
+        v = pin.difference(self.compiled.model, q, new) / self.dt
+        return Tick(self, v, HeldBack(stack, solution), started)
 
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""
@@ -284,49 +244,3 @@ class Loop:
         if promised is None:
             return True
         return self.stack.margin >= min(promised, before) - 1e-9
-
-    def active(self, solution: Solution) -> tuple[Active, ...]:
-        """What held the robot back in a step; see `Tick.active`."""
-        stack = self.stack
-        pull = max(float(np.abs(stack.g).max(initial=0.0)), 1e-12)
-        found: list[Active] = []
-        if solution.multipliers is not None:
-            m = solution.multipliers()
-            for k in np.flatnonzero(np.abs(m.box) > FAINT * pull):
-                found.append(self._bound(int(k), float(m.box[k]), pull))
-            for k in np.flatnonzero(np.abs(m.edges) > FAINT * pull):
-                found.append(Active(stack.edge_names()[k], "margin", float(abs(m.edges[k]) / pull)))
-            hard: dict[str, float] = {}
-            for (label, _), y in zip(stack.hard_names(), m.hard, strict=True):
-                hard[label] = max(hard.get(label, 0.0), abs(float(y)) / pull)
-            found += [Active(label, "hard", y) for label, y in hard.items() if y > FAINT]
-        else:
-            found = self._active_by_touch(solution)
-        return tuple(sorted(found, key=lambda a: -np.nan_to_num(a.multiplier)))
-
-    def _bound(self, column: int, multiplier: float, pull: float) -> Active:
-        lower, upper = self.stack.box_names()[column]
-        up = multiplier > 0
-        reach = self.stack.reach(column)
-        bound = self.stack.upper[column] if up else -self.stack.lower[column]
-        kind = "speed" if bound >= reach * (1 - 1e-9) else "position"
-        return Active(upper if up else lower, kind, abs(multiplier) / pull)
-
-    def _active_by_touch(self, solution: Solution) -> list[Active]:
-        """Bounds that the step touches: where the solver gives no multipliers."""
-        stack, x = self.stack, solution.step[self.compiled.free]
-        found = []
-        for k in range(6, len(x)):
-            for up, gap in ((True, stack.upper[k] - x[k]), (False, x[k] - stack.lower[k])):
-                if gap < 1e-9:
-                    name = stack.box_names()[k][int(up)]
-                    bound = stack.upper[k] if up else -stack.lower[k]
-                    kind = "speed" if bound >= stack.reach(k) * (1 - 1e-9) else "position"
-                    found.append(Active(name, kind, float("nan")))
-        promised, polygon = self.compiled.margin, self.compiled.polygon
-        if polygon is not None and promised is not None:
-            room = polygon.offsets - polygon.normals @ stack.kinematics.com[:2] - promised
-            found += [
-                Active(stack.edge_names()[k], "margin", float("nan")) for k in np.flatnonzero(room < 2e-4)
-            ]
-        return found

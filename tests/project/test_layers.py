@@ -31,6 +31,7 @@ LAYERS = [
     "stack",
     "diagnose",
     "qp",
+    "active",
     "retract",
     "backends",
     "tick",

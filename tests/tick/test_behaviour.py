@@ -291,3 +291,20 @@ def test_the_backends_agree_on_what_they_reach(legarm: wb.Robot) -> None:
 def test_an_unknown_backend_lists_those_that_exist(legarm: wb.Robot) -> None:
     with pytest.raises(wb.SpecError, match="proxqp, placo"):
         wb.Loop(legarm, stand(), legarm.state("stand"), backend="osqp")
+
+
+def test_a_tick_keeps_what_it_reports(legarm: wb.Robot) -> None:
+    """Errors and active limits read later are those of the tick, not of the loop as it is then."""
+    start = legarm.state("stand")
+    down = pin.SE3(np.eye(3), start.pose("body").translation - np.array([0.0, 0.0, 0.15]))
+    phase = stand(soft=[wb.PoseTask("body", down, weight=20.0), wb.PostureTask(weight=0.1)])
+    loop = wb.Loop(legarm, phase, start, dt=0.01)
+    first = {a.name for a in wb.Loop(legarm, phase, start, dt=0.01).step().active}
+    ticks, errors = [], []
+    for _ in range(60):
+        ticks.append(loop.step())
+        errors.append(loop.stack.errors())
+    assert errors[0] != errors[-1]
+    assert [dict(tick.errors) for tick in ticks] == errors
+    assert {a.name for a in ticks[0].active} == first
+    assert {a.kind for a in ticks[0].active} != {a.kind for a in ticks[-1].active}

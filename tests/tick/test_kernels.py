@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import wbplan as wb
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.kernels import log_derivative, rotation_log
+from wbplan.qp import Multipliers
 from wbplan.sampling import sample
 from wbplan.stack import Stack
 
@@ -110,18 +111,19 @@ def test_the_linear_solve_finds_the_solvers_step_and_multipliers(
     found_active, hits = 0, []
     solve = ActiveSetGuess.solve
 
-    def compared(self: ActiveSetGuess) -> np.ndarray | None:
+    def compared(self: ActiveSetGuess) -> tuple[np.ndarray, Multipliers] | None:
         nonlocal found_active
-        x = solve(self)
-        hits.append(x is not None)
-        if x is not None:
+        found = solve(self)
+        hits.append(found is not None)
+        if found is not None:
+            x, multipliers = found
             results, edges = asked_of_proxqp(self._stack), len(self._stack.d)
             np.testing.assert_allclose(x, results.x, atol=2e-7)
             scale = np.abs(results.z).max(initial=0.0) + 1e-3
-            np.testing.assert_allclose(self.multipliers.edges, results.z[:edges], atol=1e-5 * scale)
-            np.testing.assert_allclose(self.multipliers.box, results.z[edges:], atol=1e-5 * scale)
-            found_active += int((np.abs(self.multipliers.box) > 1e-6).any())
-        return x
+            np.testing.assert_allclose(multipliers.edges, results.z[:edges], atol=1e-5 * scale)
+            np.testing.assert_allclose(multipliers.box, results.z[edges:], atol=1e-5 * scale)
+            found_active += int((np.abs(multipliers.box) > 1e-6).any())
+        return found
 
     monkeypatch.setattr(ActiveSetGuess, "solve", compared)
     loop = wb.Loop(legarm, clamp_like(legarm), legarm.state("manipulate"), dt=0.01)

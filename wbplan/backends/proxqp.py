@@ -50,14 +50,12 @@ class ProxqpBackend:
         """See `Backend.solve`."""
         s = self._stack
         s.assemble()
-        x, multipliers = self._guess.solve(), self._guess.multipliers
-        if x is None:
-            x, multipliers = self._ask_solver()
+        x, multipliers = self._guess.solve() or self._ask_solver()
         step = self._rest.copy()
         step[s.free] = np.minimum(np.maximum(x, s.lower), s.upper)
         if s.driving:
             step[s.driven] = s.driven_step
-        return Solution(step, lambda: multipliers)
+        return Solution(step, multipliers)
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
