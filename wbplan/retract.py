@@ -10,13 +10,19 @@ import pinocchio as pin
 import proxsuite
 from numpy.typing import NDArray
 
-from wbplan.stack import Stack
+from wbplan.stack import UNBOUNDED, Stack
 
 Array = NDArray[np.float64]
 
 #: Drift of a hard row [m or rad] that is left to the next tick.
 DRIFT = 1e-5
+
+#: Most corrections in one tick.
 MOST = 4
+
+#: Singular values of the hard rows below this share of the largest are left alone: a loop at a singular
+#: configuration is not opened by what it cannot close.
+SINGULAR = 1e-6
 
 
 @final
@@ -65,22 +71,18 @@ class Retraction:
         return low, high
 
     def _solve(self, lower: Array, upper: Array) -> Array | None:
+        """The least step onto the hard rows: by least squares where no bound is in its way."""
         stack = self._stack
+        lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+        x: Array = np.linalg.lstsq(stack.A, stack.b, rcond=SINGULAR)[0]
+        if (lower <= x).all() and (x <= upper).all() and (stack.C @ x <= stack.d).all():
+            return x
         n, edges = len(stack.g), len(stack.d)
         qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
         qp.settings.eps_abs = 1e-9
         qp.settings.primal_infeasibility_solving = True
-        qp.init(
-            np.eye(n),
-            np.zeros(n),
-            stack.A,
-            stack.b,
-            stack.C,
-            np.full(edges, -1e20),
-            stack.d,
-            np.minimum(lower, 0.0),
-            np.maximum(upper, 0.0),
-        )
+        unbounded = np.full(edges, -UNBOUNDED)
+        qp.init(np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, unbounded, stack.d, lower, upper)
         qp.solve()
-        x = np.array(qp.results.x)
+        x = np.array(qp.results.x, dtype=np.float64)
         return x if np.isfinite(x).all() else None
