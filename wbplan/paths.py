@@ -139,7 +139,8 @@ def _blend(start: Value, goal: Value, s: float) -> Value:
 class Path(abc.ABC):
     """A target over time. `at(t)` is defined for every t >= 0: a path rests at its end."""
 
-    #: Whether the value may change between two calls with the same time (only `Live`).
+    #: Whether the value may change between two calls with the same time, as a slider's or a device's does.
+    #: Other paths are read many ticks ahead.
     live: bool = False
     #: What its values are, in the words of messages; `None` where that is not known before `bind`.
     kind: str | None = None

@@ -130,6 +130,9 @@ def plan(
     recorder = Recorder(robot, script, dt)
     lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
     done = 0  # ticks
+    for phase in script.phases:
+        if phase.joint_limits is None:
+            raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
         loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles)
         _promises_hold(loop, phase)

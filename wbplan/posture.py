@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.compiled import JointTarget
-from wbplan.paths import MinJerk
+from wbplan.paths import MinJerk, number
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Posture:
             s = np.minimum(t / self._duration, 1.0)
             self.goal[self._ramps] = self._from + self._way * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
         for k, path in self._others:
-            self.goal[k] = float(path.at(t))
+            self.goal[k] = number(path.at(t), f"{self.label} at {t:.4g} s", "a finite joint position")
         self.step[:] = 0.0
 
     def advance(self, t: float) -> None:

@@ -74,9 +74,9 @@ class Retraction:
         """The least step onto the hard rows: by least squares where no bound is in its way."""
         stack = self._stack
         lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
-        x: Array = np.linalg.lstsq(stack.A, stack.b, rcond=SINGULAR)[0]
-        if (lower <= x).all() and (x <= upper).all() and (stack.C @ x <= stack.d).all():
-            return x
+        least = np.asarray(np.linalg.lstsq(stack.A, stack.b, rcond=SINGULAR)[0], dtype=np.float64)
+        if (lower <= least).all() and (least <= upper).all() and (stack.C @ least <= stack.d).all():
+            return least
         n, edges = len(stack.g), len(stack.d)
         qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
         qp.settings.eps_abs = 1e-9
@@ -84,5 +84,5 @@ class Retraction:
         unbounded = np.full(edges, -UNBOUNDED)
         qp.init(np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, unbounded, stack.d, lower, upper)
         qp.solve()
-        x = np.array(qp.results.x, dtype=np.float64)
-        return x if np.isfinite(x).all() else None
+        closest: Array = qp.results.x.copy()
+        return closest if np.isfinite(closest).all() else None

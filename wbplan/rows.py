@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from wbplan import kernels
 from wbplan.compiled import WORLD, ComTarget, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.paths import checked
 from wbplan.sampling import sample
 
 Array = NDArray[np.float64]
@@ -153,7 +154,7 @@ class Rows:
         self._ahead = None
         self.motion[:] = 0.0
         for path, place, turn, com in self._paths:
-            value = path.at(t)
+            value = checked(path.at(t), f"{type(path).__name__} at {t:.4g} s")
             pose = isinstance(value, pin.SE3)
             if place is not None:
                 self.position_goal[place] = value.translation if pose else value

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from wbplan import kernels
 from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.paths import number
 from wbplan.posture import Posture
 from wbplan.rows import Rows
 
@@ -191,9 +192,10 @@ class Stack:
             posture.advance(t)
         q = self.kinematics.q
         for k, driven in self._moving_driven:
-            self.driven_step[k] = float(driven.path.at(t)) - q[7 + driven.joint]
+            goal = number(driven.path.at(t), f"driven joint at {t:.4g} s", "a finite position")
+            self.driven_step[k] = goal - q[7 + driven.joint]
         for i, (joint, path, _) in enumerate(self.hard_joints):
-            self.hard_joint_goal[i] = float(path.at(t))
+            self.hard_joint_goal[i] = number(path.at(t), f"hard posture at {t:.4g} s", "a finite position")
             self.hard_error[self.rows.hard + i] = self.hard_joint_goal[i] - q[7 + joint]
 
     def measure(self, q: Array) -> None:
@@ -280,7 +282,12 @@ class Stack:
         for label, part, span in self.rows.labels:
             if span.stop <= self.rows.hard:
                 names += [(label, "m" if part == "position" else "rad")] * (span.stop - span.start)
-        return names + [(label, "rad") for _, _, label in self.hard_joints]
+        sliding = {
+            j
+            for j, joint in enumerate(list(self.phase.model.joints)[2:])
+            if "JointModelP" in joint.shortname()
+        }
+        return names + [(label, "m" if j in sliding else "rad") for j, _, label in self.hard_joints]
 
     def edge_names(self) -> list[str]:
         """Name of every support-polygon row: the two feet that its edge joins."""

@@ -231,6 +231,8 @@ def test_a_path_that_breaks_its_word_is_not_integrated(legarm: wb.Robot, backend
         def at(self, t: float) -> np.ndarray:
             return np.array([0.3, 0.0, 0.2 if t < 0.015 else np.nan])
 
+        live = True
+
     loop = wb.Loop(
         legarm,
         stand(soft=[wb.PositionTask("limb1_tip", Broken(), name="broken")]),
@@ -240,7 +242,7 @@ def test_a_path_that_breaks_its_word_is_not_integrated(legarm: wb.Robot, backend
     )
     loop.step()
     before = np.array(loop.q)
-    with pytest.raises(wb.WbplanError):
+    with pytest.raises(wb.SpecError, match="Broken"):
         loop.step()
     np.testing.assert_array_equal(loop.q, before)
     assert np.isfinite(loop.q).all()
@@ -308,3 +310,23 @@ def test_a_tick_keeps_what_it_reports(legarm: wb.Robot) -> None:
     assert [dict(tick.errors) for tick in ticks] == errors
     assert {a.name for a in ticks[0].active} == first
     assert {a.kind for a in ticks[0].active} != {a.kind for a in ticks[-1].active}
+
+
+def test_a_posture_path_that_breaks_its_word_is_refused(legarm: wb.Robot) -> None:
+    class Broken(wb.Path):
+        def at(self, t: float) -> float:
+            return 0.1 if t < 0.015 else np.nan
+
+    phase = stand(soft=[wb.PostureTask({"leg3_joint2": Broken()}, weight=1.0)])
+    loop = wb.Loop(legarm, phase, legarm.state("stand"), dt=0.01)
+    loop.step()
+    before = np.array(loop.q)
+    with pytest.raises(wb.SpecError, match="posture"):
+        loop.step()
+    np.testing.assert_array_equal(loop.q, before)
+
+
+@pytest.mark.parametrize("dt", ["0.01", 0.0, -1.0, np.nan])
+def test_a_tick_needs_a_length(legarm: wb.Robot, dt: float) -> None:
+    with pytest.raises(wb.SpecError, match="dt"):
+        wb.Loop(legarm, stand(), legarm.state("stand"), dt=dt)
