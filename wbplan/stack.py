@@ -121,7 +121,9 @@ class Stack:
             Posture(t, self.free, self.dt, self._posture_goal[k], self._posture_step[k])
             for k, t in enumerate(targets)
         ]
-        self._stiffness = np.array([p.stiffness for p in self.postures]).reshape(-1, nf - 6)
+        self._stiffness = np.zeros((len(targets), nf - 6))
+        for k, posture in enumerate(self.postures):
+            self._stiffness[k] = posture.stiffness
         self._posture_pull = np.array([p.pull for p in self.postures])
         self._diagonal = np.full(nf, REGULARISATION + self.phase.damping)
         self._diagonal[6:] += self._stiffness.sum(axis=0)

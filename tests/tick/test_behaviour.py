@@ -330,3 +330,14 @@ def test_a_posture_path_that_breaks_its_word_is_refused(legarm: wb.Robot) -> Non
 def test_a_tick_needs_a_length(legarm: wb.Robot, dt: float) -> None:
     with pytest.raises(wb.SpecError, match="dt"):
         wb.Loop(legarm, stand(), legarm.state("stand"), dt=dt)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_com_that_cannot_come_inside_stays_where_it_is(legarm: wb.Robot, backend: str) -> None:
+    """Every joint is locked, so nothing can move inward: that is no reason to find no step."""
+    start = legarm.state("stand")
+    limits = [wb.JointLimits(), wb.SupportPolygon(margin=0.5)]
+    loop = wb.Loop(legarm, stand(limits=limits, locked=legarm.joint_names), start, dt=0.01, backend=backend)
+    tick = loop.step()
+    assert "margin not yet reached" in tick.warning
+    np.testing.assert_allclose(tick.q, start.q, atol=2e-5)  # the drift that is left to the next tick, twice

@@ -7,8 +7,8 @@ it does not have is made up for here:
 - it has no gain, so a soft target is put where the gained step leads;
 - it has one weight a task, squared weights, and masks: a task of unequal weights becomes several;
 - its polygon must be clockwise, and one that is not is "infeasible" without a word;
-- hard rows that depend on each other make it throw. Those of such rows that are not contacts are given to it
-  as soft ones of a weight above all others, and the tick's own correction then puts them in full.
+- hard rows that depend on each other make it throw. Such rows, contacts last, are given to it as soft ones of
+  a weight above all others, and the tick's own correction then puts them in full.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ class PlacoBackend:
         if names != list(phase.robot.joint_names):
             raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
         self._soft_labels: set[str] = set()
+        self._patient = False
         self._widened: set[int] = set()
         self._build()
 
@@ -193,24 +194,33 @@ class PlacoBackend:
         support = stack.phase.phase.support
         if support is None:
             return 0.0
-        wanted = support.margin + MARGIN_RESERVE
-        return min(wanted, stack.margin + support.recovery_speed * stack.dt)
+        inward = 0.0 if self._patient else support.recovery_speed * stack.dt
+        self._patient = False
+        return min(support.margin + MARGIN_RESERVE, stack.margin + inward)
 
     # -- each tick ---------------------------------------------------------------------------------------
 
     def solve(self) -> Solution:
         """See `Backend.solve`."""
-        try:
-            step = self._solve()
-        except RuntimeError:
-            self._soft_labels |= _dependent(self._stack)
-            self._build()
+        for mend in (self._soften, self._wait_for_margin):
             try:
-                step = self._solve()
-            except RuntimeError as error:
-                self._stack.assemble()
-                raise solve_error(self._stack, f"PlaCo finds no step ({_one_line(error)})") from None
-        return Solution(step)
+                return Solution(self._solve())
+            except RuntimeError:
+                mend()
+        try:
+            return Solution(self._solve())
+        except RuntimeError as error:
+            self._stack.assemble()
+            raise solve_error(self._stack, f"PlaCo finds no step ({_one_line(error)})") from None
+
+    def _soften(self) -> None:
+        """Hard rows may have come to depend on each other: tell PlaCo those as heavy soft ones."""
+        self._soft_labels |= _dependent(self._stack)
+        self._build()
+
+    def _wait_for_margin(self) -> None:
+        """Ask a CoM that is outside its margin only not to go further out."""
+        self._patient = True
 
     def _solve(self) -> Array:
         stack, robot = self._stack, self._robot
@@ -291,7 +301,7 @@ def _rests(target: FrameTarget) -> bool:
 
 
 def _dependent(stack: Stack) -> set[str]:
-    """Labels of hard rows, contacts left out, that depend on the others at the current configuration."""
+    """Labels of hard rows that depend on each other as the robot stands; contacts only if no task does."""
     if stack.n_hard == 0:
         return set()
     stack.assemble()
@@ -300,7 +310,7 @@ def _dependent(stack: Stack) -> set[str]:
     share = np.abs(left[:, rank:]).max(axis=1, initial=0.0)
     names = stack.hard_names()
     found = {names[k][0] for k in np.flatnonzero(share > 1e-3)}
-    return {label for label in found if not label.startswith("contact(")}
+    return {label for label in found if not label.startswith("contact(")} or found
 
 
 def _urdf_with_carried(phase: CompiledPhase) -> str:
