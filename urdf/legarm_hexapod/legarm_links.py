@@ -5,32 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import cos, pi, radians, sin
 
-from legarm_table import DRS_0101, DRS_0401, SIDE, Servo, T
-from shapes import ORIGIN, Part, Triple, block, box, cylinder, hexagon, rod, sphere
+from legarm_table import SIDE, T
+from servos import DRS_0101, DRS_0401, horns, housing
+from shapes import ORIGIN, Part, block, box, cylinder, hexagon, rod, sphere
 from writer import Link
-
-
-def housing(servo: Servo, shaft: Triple, along: str, axis: str, back: bool = True) -> Part:
-    """A servo's housing: its shaft through the point `shaft` along `axis`, its long side along +-`along`."""
-    order = {"x": 0, "y": 1, "z": 2}
-    long, short, deep = servo.size
-    low, high = [-short / 2] * 3, [short / 2] * 3
-    low[order[axis]], high[order[axis]] = -deep / 2, deep / 2
-    far, near = long - servo.shaft, servo.shaft
-    low[order[along]], high[order[along]] = (-far, near) if back else (-near, far)
-    corner = [tuple(s + v for s, v in zip(shaft, side, strict=True)) for side in (low, high)]
-    return block(corner[0], corner[1], "servo_black", mass=servo.mass)  # type: ignore[arg-type]
-
-
-def horns(at: Triple, axis: str, inner: float, outer: float, radius: float = 0.011) -> Iterator[Part]:
-    """Two discs on a joint's axis, from `inner` to `outer` on either side: drawn only."""
-    unit = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}[axis]
-    for side in (1.0, -1.0):
-        start, end = (
-            (at[0] + side * d * unit[0], at[1] + side * d * unit[1], at[2] + side * d * unit[2])
-            for d in (inner, outer)
-        )
-        yield rod(start, end, radius, "servo_horn", mass=0.0)
 
 
 def body() -> Link:
