@@ -1,5 +1,6 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
+from wbplan.active import Active
 from wbplan.bodies import Body, Carried
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
@@ -30,7 +31,7 @@ from wbplan.tasks import (
     RelativePoseTask,
     Task,
 )
-from wbplan.tick import Active, Loop, Tick
+from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION as __version__
 
 __all__ = [
@@ -72,8 +73,8 @@ __all__ = [
     "Tick",
     "Trajectory",
     "ViewError",
-    "WbplanError",
     "Waypoints",
+    "WbplanError",
     "__version__",
     "check",
     "load_robot",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
-from wbplan.errors import SolveError, SpecError
+from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.paths import number
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
@@ -123,11 +124,15 @@ def plan(
         raise SpecError(f"start: a state of '{state.model.name}', expected one of '{robot.name}'")
     q, roles = np.array(state.q), None
     _inside_limits(robot, q)
+    placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
+    _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
     started = time.perf_counter()
     recorder = Recorder(robot, script, dt)
-    placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
     done = 0  # ticks
+    for phase in script.phases:
+        if phase.joint_limits is None:
+            raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
         loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles)
         _promises_hold(loop, phase)
@@ -153,6 +158,17 @@ def plan(
         progress(1.0, "done")
     bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
     return Plan(robot, bundle)
+
+
+def _compile_kernels(
+    robot: Robot, phase: Phase, q: Array, dt: float, backend: str, placed: Mapping[str, Any]
+) -> None:
+    """One tick thrown away: the first one of a machine compiles the kernels, seconds that are not planning.
+
+    What is wrong with the phase is said when it is planned.
+    """
+    with contextlib.suppress(WbplanError):
+        Loop(robot, phase, q, dt, backend=backend, placed=placed).step()
 
 
 def _inside_limits(robot: Robot, q: Array) -> None:

@@ -15,8 +15,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbplan as wb
+
 URDF = Path(__file__).resolve().parents[2] / "urdf"
-ROBOTS = sorted(script.parent.name for script in URDF.glob("*/generate.py"))
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,11 @@ class Machine:
     @cached_property
     def solids(self) -> pin.GeometryModel:
         return pin.buildGeomFromUrdf(self.model, str(self.urdf), pin.GeometryType.COLLISION)
+
+    @cached_property
+    def robot(self) -> wb.Robot:
+        """As the planner sees it."""
+        return wb.load_robot(self.name)
 
     def states(self, group: str) -> dict[str, dict[str, float]]:
         """Group states: name -> joint -> value."""
@@ -109,31 +115,51 @@ class Machine:
         return str(self.model.frames[geometry.parentFrame].name)
 
 
+MACHINES = {path.parent.name: Machine(path.parent.name) for path in sorted(URDF.glob("*/generate.py"))}
+
+
+@pytest.fixture(scope="session", params=MACHINES.values(), ids=MACHINES.keys())
+def machine(request) -> Machine:
+    """Each robot of the repository."""
+    return request.param
+
+
 @pytest.fixture(scope="session")
 def machines() -> dict[str, Machine]:
-    """Every robot that ships, each read once."""
-    return {name: Machine(name) for name in ROBOTS}
-
-
-@pytest.fixture(scope="session", params=ROBOTS)
-def machine(request: pytest.FixtureRequest, machines: dict[str, Machine]) -> Machine:
-    """One after the other."""
-    return machines[request.param]
+    """The same by name."""
+    return MACHINES
 
 
 @pytest.fixture(scope="session")
-def legarm(machines: dict[str, Machine]) -> Machine:
-    return machines["legarm_hexapod"]
+def legarm() -> Machine:
+    return MACHINES["legarm_hexapod"]
 
 
 @pytest.fixture(scope="session")
-def heavy(machines: dict[str, Machine]) -> Machine:
-    return machines["heavy_hexapod"]
+def sway() -> Callable[..., wb.Plan]:
+    """Plans how a robot's body moves out and back while all its feet stay."""
 
+    def plan(robot: wb.Robot, pose: str, shift, turn, margin: float = 0.02) -> wb.Plan:
+        start = robot.state(pose)
+        body = next(frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY)
+        here = start.pose(body)
+        there = pin.SE3(here.rotation @ pin.exp3(np.array(turn)), here.translation + np.array(shift))
+        phase = wb.Phase(
+            "sway",
+            contacts=[wb.Contact(foot, friction=0.6) for foot in robot.standing_feet(start.q)],
+            soft=[
+                wb.PoseTask(
+                    body, wb.Waypoints((0.0, 0.6, 1.2), [wb.AS_IS, there, here]), weight=(20.0, 10.0)
+                ),
+                wb.PostureTask(weight=0.01),
+                wb.DampingTask(),
+            ],
+            limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+            duration=1.2,
+        )
+        return wb.plan(robot, phase, start=start, dt=0.02)
 
-@pytest.fixture(scope="session")
-def hiphant(machines: dict[str, Machine]) -> Machine:
-    return machines["hiphant"]
+    return plan
 
 
 @pytest.fixture(scope="session")

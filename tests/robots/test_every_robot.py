@@ -1,4 +1,4 @@
-"""What holds of every robot that ships: its files, names, inertias, poses and collision pairs."""
+"""What holds for every robot of the repository: its files, names, bodies, poses and collision pairs."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from collections import Counter
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
-import wbplan as wb
+from wbplan import catalog
+
+# --- files and names
 
 
 def test_committed_files_are_what_the_generator_writes(machine, run_script):
@@ -17,14 +20,11 @@ def test_committed_files_are_what_the_generator_writes(machine, run_script):
         assert (machine.folder / name).read_text(encoding="utf-8") == text, f"{name}: run generate.py again"
 
 
-def test_it_loads_by_its_name_without_a_problem_or_a_warning(machine):
-    robot = wb.load_robot(machine.name)
-    assert robot.name == machine.name
-    assert robot.warnings == ()
+def test_it_ships_and_loads_without_a_warning(machine):
+    assert catalog.robots()[machine.name] == machine.urdf
+    assert machine.robot.name == machine.name
+    assert machine.robot.warnings == ()
     assert (machine.folder / "README.md").is_file()
-
-
-# --- names
 
 
 def test_every_frame_has_a_name_of_its_own(machine):
@@ -39,16 +39,6 @@ def test_materials_are_defined_once_and_all_of_them_are_used(machine):
     assert set(defined) == used
 
 
-def test_every_joint_belongs_to_one_limb_and_every_limb_ends_somewhere(machine):
-    robot = wb.load_robot(machine.name)
-    joints = [joint for limb in robot.limbs.values() for joint in limb]
-    assert sorted(joints) == sorted(machine.model.names[2:])
-    assert set(robot.limbs) == set(robot.feet) | set(robot.hands)
-
-
-# --- bodies
-
-
 def test_every_link_with_mass_can_be_seen_and_hit(machine):
     for link in machine.links.iter("link"):
         shown = (link.find("visual") is not None, link.find("collision") is not None)
@@ -56,38 +46,75 @@ def test_every_link_with_mass_can_be_seen_and_hit(machine):
         assert shown == (massive, massive), link.attrib["name"]
 
 
+def test_tips_belong_to_their_limbs(machine):
+    keys = ("name", "parent_link", "group", "parent_group")
+    tips = [tuple(e.attrib[k] for k in keys) for e in machine.meaning.iter("end_effector")]
+    feet = [(frame, frame, "feet", limb) for limb, frame in machine.robot.feet.items()]
+    assert tips == feet + [(frame, frame, "hands", limb) for limb, frame in machine.robot.hands.items()]
+
+
+def test_every_joint_belongs_to_one_limb_and_every_limb_has_a_tip(machine):
+    joints = [joint for limb in machine.robot.limbs.values() for joint in limb]
+    assert sorted(joints) == sorted(machine.model.names[2:])
+    assert set(machine.robot.limbs) == {*machine.robot.feet, *machine.robot.hands}
+
+
+# --- bodies
+
+
 def test_inertias_are_those_of_real_bodies(machine):
-    for name, inertia in zip(machine.model.names[1:], machine.model.inertias[1:], strict=True):
+    corners = {joint: [np.zeros(3)] for joint in range(machine.model.njoints)}
+    for shape in machine.solids.geometryObjects:
+        shape.geometry.computeLocalAABB()
+        low, high = shape.geometry.aabb_local.min_, shape.geometry.aabb_local.max_
+        for k in range(8):
+            corner = np.where([k & 1, k & 2, k & 4], high, low)
+            corners[shape.parentJoint].append(shape.placement.act(corner))
+    for joint, inertia in enumerate(machine.model.inertias[1:], start=1):
+        name = machine.model.names[joint]
         i1, i2, i3 = np.linalg.eigvalsh(inertia.inertia)
         assert inertia.mass > 0, name
         assert i1 > 0, name
         assert i1 + i2 > i3 * (1 + 1e-6), name
-        # No link is much longer than half a metre, and none is a point.
-        assert 0.002 < np.sqrt(i3 / inertia.mass) < 0.3, name
+        reach = max(np.linalg.norm(corner - inertia.lever) for corner in corners[joint])
+        assert 0.1 * reach < np.sqrt(i3 / inertia.mass) < reach, name
+
+
+def test_joints_have_speeds_and_efforts(machine):
+    assert np.all((machine.model.velocityLimit[6:] > 0) & (machine.model.velocityLimit[6:] < 50))
+    assert np.all((machine.model.effortLimit[6:] > 0) & (machine.model.effortLimit[6:] < 1e4))
 
 
 # --- poses
 
 
 def test_poses_name_every_joint_and_keep_the_limits(machine):
-    low, high = machine.model.lowerPositionLimit[7:], machine.model.upperPositionLimit[7:]
-    for name, pose in machine.states("all").items():
-        assert sorted(pose) == sorted(machine.model.names[2:]), name
-        q = machine.q(name)[7:]
-        assert np.all((q >= low) & (q <= high)), name
+    for pose, values in machine.states("all").items():
+        assert sorted(values) == sorted(machine.model.names[2:]), pose
+        q = machine.q(pose)[7:]
+        assert np.all(q >= machine.model.lowerPositionLimit[7:]), pose
+        assert np.all(q <= machine.model.upperPositionLimit[7:]), pose
 
 
-def test_in_every_pose_the_standing_feet_are_on_the_ground(machine):
-    robot = wb.load_robot(machine.name)
-    assert "stand" in robot.poses
-    for name in robot.poses:
-        state = robot.state(name)
-        heights = [state.pose(foot).translation[2] for foot in robot.standing_feet(state.q)]
-        assert len(heights) >= 3
-        np.testing.assert_allclose(heights, 0.0, atol=1e-9, err_msg=name)
+def test_all_feet_stand_on_the_ground(machine):
+    state = machine.robot.state("stand")
+    heights = [state.pose(foot).translation[2] for foot in machine.robot.feet.values()]
+    np.testing.assert_allclose(heights, 0.0, atol=1e-9)
 
 
-# --- collisions
+def test_in_other_poses_the_feet_of_legs_do(machine):
+    for pose in machine.robot.poses:
+        state = machine.robot.state(pose)
+        heights = [state.pose(foot).translation[2] for foot in machine.robot.standing_feet(state.q)]
+        np.testing.assert_allclose(heights, 0.0, atol=1e-9, err_msg=pose)
+
+
+def test_poses_touch_nothing(machine):
+    for pose in machine.states("all"):
+        assert machine.hits(machine.checked, machine.q(pose)) == set(), pose
+
+
+# --- collision pairs
 
 
 def test_disabled_pairs_are_links_and_listed_once(machine):
@@ -95,11 +122,6 @@ def test_disabled_pairs_are_links_and_listed_once(machine):
     pairs = machine.disabled()
     assert all(len(pair) == 2 and pair <= links for pair in pairs)
     assert [pair for pair, count in Counter(pairs).items() if count > 1] == []
-
-
-def test_poses_touch_nothing(machine):
-    for name in machine.states("all"):
-        assert machine.hits(machine.checked, machine.q(name)) == set(), name
 
 
 def test_pairs_called_never_stay_apart(machine):
@@ -114,7 +136,21 @@ def test_pairs_called_never_stay_apart(machine):
         q[7:] = low + np.where(at_end, np.round(share), share) * (high - low)
         pin.updateGeometryPlacements(machine.model, data, never, found, q)
         pin.computeDistances(never, found)
-        closest = int(np.argmin([result.min_distance for result in found.distanceResults]))
-        pair = never.collisionPairs[closest]
-        names = [machine.link_of(never.geometryObjects[k]) for k in (pair.first, pair.second)]
-        assert found.distanceResults[closest].min_distance > 0.02, names
+        assert all(result.min_distance > 0.02 for result in found.distanceResults)
+
+
+# --- plans
+
+
+def test_its_body_sways_on_all_feet(machine, sway):
+    plan = sway(machine.robot, "stand", (0.006, 0.004, 0.006), (0.02, 0.01, 0.04))
+    report = plan.check()
+    assert report.ok, report
+    asked = plan.bundle.phases[0]["tasks"][0]
+    assert asked["position"] < 1e-3
+    assert asked["orientation"] < 2e-3
+    start, farthest = plan.trajectory.q[0], plan.trajectory.q[len(plan.trajectory.q) // 2]
+    np.testing.assert_allclose(farthest[:3] - start[:3], (0.006, 0.004, 0.006), atol=1e-3)
+    assert np.linalg.norm(farthest[3:6]) == pytest.approx(
+        np.sin(np.linalg.norm((0.02, 0.01, 0.04)) / 2), rel=0.05
+    )

@@ -16,8 +16,13 @@ LOAD = 1519.0  # [N]
 
 
 @pytest.fixture(scope="module")
-def robot() -> wb.Robot:
-    return wb.load_robot("heavy_hexapod")
+def heavy(machines):
+    return machines["heavy_hexapod"]
+
+
+@pytest.fixture(scope="module")
+def robot(heavy) -> wb.Robot:
+    return heavy.robot
 
 
 def leg_angles(state: wb.State, leg: str) -> tuple[float, float, float]:

@@ -16,8 +16,13 @@ GRAVITY = 9.80665
 
 
 @pytest.fixture(scope="module")
-def robot() -> wb.Robot:
-    return wb.load_robot("hiphant")
+def hiphant(machines):
+    return machines["hiphant"]
+
+
+@pytest.fixture(scope="module")
+def robot(hiphant) -> wb.Robot:
+    return hiphant.robot
 
 
 def turn(axis: str, angle: float) -> np.ndarray:

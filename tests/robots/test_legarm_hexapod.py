@@ -10,7 +10,7 @@ ARMS, LEGS = ("limb1", "limb2"), ("leg3", "leg4", "leg5", "leg6")
 LIMBS = (*ARMS, *LEGS)
 
 
-# --- files and names
+# --- names
 
 
 def test_limbs_are_their_joints_in_order(legarm):
@@ -22,13 +22,6 @@ def test_limbs_are_their_joints_in_order(legarm):
     assert groups["feet"] == [f"{limb}_foot" for limb in LIMBS]
     assert groups["hands"] == [f"{limb}_tip" for limb in ARMS]
     assert sorted(j for limb in LIMBS for j in groups[limb]) == sorted(legarm.model.names[2:])
-
-
-def test_tips_belong_to_their_limbs(legarm):
-    keys = ("name", "parent_link", "group", "parent_group")
-    tips = [tuple(e.attrib[k] for k in keys) for e in legarm.meaning.iter("end_effector")]
-    feet = [(f"{limb}_foot", f"{limb}_foot", "feet", limb) for limb in LIMBS]
-    assert tips == feet + [(f"{limb}_tip", f"{limb}_tip", "hands", limb) for limb in ARMS]
 
 
 # --- Table 1

@@ -117,7 +117,7 @@ def test_four_evenly_loaded_legs_hold_robot_and_box_below_stall(legarm):
 
 
 def test_crossed_limbs_do_touch(legarm):
-    # Limbs 1 and 2 turned at each other: the test that poses touch nothing could see it.
+    # Limbs 1 and 2 turned at each other: the test of all poses could see it.
     active = legarm.solids_with(set(legarm.disabled()), keep=False)
     q = legarm.q(legarm.states("all")["stand"] | {"limb1_joint1": 0.0, "limb2_joint1": np.pi})
     assert ("limb1_thigh", "limb2_thigh") in legarm.hits(active, q)

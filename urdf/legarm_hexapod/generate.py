@@ -23,7 +23,8 @@ for folder in (HERE, HERE.parent):  # this robot's modules, and the helpers that
         sys.path.insert(0, str(folder))
 
 from legarm_links import arm1, arm2, body, hip, jaw, shank, shank1, slide, thigh  # noqa: E402
-from legarm_table import ARMS, DRS_0101, DRS_0401, LEGS, LIMBS, MATERIALS, NAME, NOTE, Servo, T  # noqa: E402
+from legarm_table import ARMS, LEGS, LIMBS, MATERIALS, NAME, NOTE, T  # noqa: E402
+from servos import DRS_0101, DRS_0401  # noqa: E402
 from shapes import ORIGIN  # noqa: E402
 from writer import Joint, Link, Semantics, srdf, urdf  # noqa: E402
 
@@ -32,11 +33,6 @@ def structure_masses(total: float, servos: float, lengths: Mapping[str, float]) 
     """What remains of a limb's mass without its servos, shared among its links by their lengths."""
     whole = sum(lengths.values())
     return {link: (total - servos) * length / whole for link, length in lengths.items()}
-
-
-def limits(span: tuple[float, float], servo: Servo) -> tuple[float, float, float, float]:
-    """Joint limits from a span in degrees and the servo that turns it."""
-    return (radians(span[0]), radians(span[1]), servo.effort, servo.speed)
 
 
 def leg(limb: str) -> tuple[list[Link], list[Joint]]:
@@ -84,7 +80,7 @@ def arm(limb: str) -> tuple[list[Link], list[Joint]]:
             (T.shank1, 0.0, 0.0),
             ORIGIN,
             down,
-            limits(T.theta4, small),
+            small.limits(T.theta4),
         ),
         Joint(
             f"{limb}_joint5",
@@ -94,7 +90,7 @@ def arm(limb: str) -> tuple[list[Link], list[Joint]]:
             (T.arm1, 0.0, 0.0),
             ORIGIN,
             up,
-            limits(fifth, small),
+            small.limits(fifth),
         ),
         Joint(
             f"{limb}_shank2",
@@ -118,7 +114,7 @@ def arm(limb: str) -> tuple[list[Link], list[Joint]]:
                 (T.arm2 - T.hinge, side * apart, 0.0),
                 ORIGIN,
                 (0.0, 0.0, side),
-                limits((0.0, 90.0), small),
+                small.limits((0.0, 90.0)),
             )
         )
     joints += [fixed(f"{limb}_foot", f"{limb}_slide", 0.0), fixed(f"{limb}_tip", f"{limb}_arm2", T.arm2)]
@@ -141,7 +137,7 @@ def root_joints(limb: str, third: str) -> list[Joint]:
             at,
             (0.0, 0.0, yaw),
             (0.0, 0.0, 1.0),
-            limits(T.theta1, big),
+            big.limits(T.theta1),
         ),
         Joint(
             f"{limb}_joint2",
@@ -151,7 +147,7 @@ def root_joints(limb: str, third: str) -> list[Joint]:
             (T.hip, 0.0, 0.0),
             ORIGIN,
             down,
-            limits(T.theta2, big),
+            big.limits(T.theta2),
         ),
         Joint(
             f"{limb}_joint3",
@@ -161,7 +157,7 @@ def root_joints(limb: str, third: str) -> list[Joint]:
             (T.thigh, 0.0, 0.0),
             ORIGIN,
             down,
-            limits(T.theta3, big),
+            big.limits(T.theta3),
         ),
     ]
 

@@ -5,32 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import cos, pi, radians, sin
 
-from legarm_table import DRS_0101, DRS_0401, SIDE, Servo, T
-from shapes import ORIGIN, Part, Triple, block, box, cylinder, hexagon, rod, sphere
+from legarm_table import SIDE, T
+from servos import DRS_0101, DRS_0401, horns, housing
+from shapes import ORIGIN, Part, block, box, cylinder, hexagon, rod, sphere
 from writer import Link
-
-
-def housing(servo: Servo, shaft: Triple, along: str, axis: str, back: bool = True) -> Part:
-    """A servo's housing: its shaft through the point `shaft` along `axis`, its long side along +-`along`."""
-    order = {"x": 0, "y": 1, "z": 2}
-    long, short, deep = servo.size
-    low, high = [-short / 2] * 3, [short / 2] * 3
-    low[order[axis]], high[order[axis]] = -deep / 2, deep / 2
-    far, near = long - servo.shaft, servo.shaft
-    low[order[along]], high[order[along]] = (-far, near) if back else (-near, far)
-    corner = [tuple(s + v for s, v in zip(shaft, side, strict=True)) for side in (low, high)]
-    return block(corner[0], corner[1], "servo_black", mass=servo.mass)  # type: ignore[arg-type]
-
-
-def horns(at: Triple, axis: str, inner: float, outer: float, radius: float = 0.011) -> Iterator[Part]:
-    """Two discs on a joint's axis, from `inner` to `outer` on either side: drawn only."""
-    unit = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}[axis]
-    for side in (1.0, -1.0):
-        start, end = (
-            (at[0] + side * d * unit[0], at[1] + side * d * unit[1], at[2] + side * d * unit[2])
-            for d in (inner, outer)
-        )
-        yield rod(start, end, radius, "servo_horn", mass=0.0)
 
 
 def body() -> Link:
@@ -132,22 +110,26 @@ def shank(limb: str, structure: float) -> Link:
 
 
 def shank1(limb: str, structure: float) -> Link:
-    """A channel, open below, that takes the folded arm; servo 4 outside, shank 2's rail on its back."""
+    """A channel, open below, that takes the folded arm; servo 4 outside, shank 2's rail on its back.
+
+    Servo 4 holds arm 1 from the outer side alone: on the inner side, to which arm 2 turns, the channel ends
+    before it.
+    """
     side = SIDE[limb]
     outer, inner = side * 0.022, -side * 0.022
     plates = []
-    for face, end in ((outer, T.shank1 + 0.010), (inner, T.shank1)):
+    for face, end in ((outer, T.shank1 - 0.008), (inner, T.shank1 - 0.035)):
         low, high = sorted((face, face * (0.0245 / 0.022)))
         plates.append(block((-0.012, low, -0.014), (0.040, high, 0.014), solid=True))
-        plates.append(block((0.040, low, -0.014), (end - 0.018, high, 0.021), solid=True))
-        plates.append(block((end - 0.018, low, -0.010), (end, high, 0.010), solid=True))
+        plates.append(block((0.040, low, -0.014), (end, high, 0.021), solid=True))
+    low, high = sorted((outer, outer * (0.0245 / 0.022)))
+    plates.append(block((T.shank1 - 0.008, low, -0.010), (T.shank1 + 0.010, high, 0.010), solid=True))
     low, high = sorted((side * 0.0245, side * (0.0245 + DRS_0101.size[2])))
     servo = housing(DRS_0101, (T.shank1, (low + high) / 2, 0.0), "x", "y")
     parts = [
         *plates,
         block((0.040, -0.022, 0.0195), (0.125, 0.022, 0.0210), solid=True),
         Part(servo.shape, servo.xyz, material="servo_black", mass=DRS_0101.mass, solid=True),
-        rod((T.shank1, 0.0245 * -side, 0.0), (T.shank1, 0.0275 * -side, 0.0), 0.007, "servo_horn", mass=0.0),
         *(block((x, -0.008, 0.021), (x + 0.016, 0.008, 0.033), "blue", mass=0.0) for x in (0.056, 0.106)),
     ]
     return Link(f"{limb}_shank1", tuple(parts), structure)

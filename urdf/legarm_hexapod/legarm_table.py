@@ -3,26 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
-
-from shapes import Triple
-
-KGF_CM = 9.80665e-2  # [N m]
-
-
-@dataclass(frozen=True)
-class Servo:
-    """A servo: mass, housing (along, across, axis), where its shaft is, and what it can do."""
-
-    mass: float  # [kg], Table 2
-    size: Triple  # [m], maker's data sheet: long side, short side, along the shaft
-    shaft: float  # [m], shaft axis to the nearer end of the long side (assumed)
-    effort: float  # [N m], maker's data: stall torque
-    speed: float  # [rad/s], maker's data: no load
-
-
-DRS_0401 = Servo(0.123, (0.056, 0.035, 0.038), 0.018, 52 * KGF_CM, radians(60) / 0.147)
-DRS_0101 = Servo(0.045, (0.045, 0.024, 0.031), 0.008, 12 * KGF_CM, radians(60) / 0.166)
 
 
 @dataclass(frozen=True)
