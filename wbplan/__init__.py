@@ -16,7 +16,7 @@ from wbplan.errors import (
     WbplanError,
 )
 from wbplan.limits import JointLimits, SupportPolygon
-from wbplan.paths import AS_IS, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
+from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
 from wbplan.script import Phase, Script
@@ -45,6 +45,7 @@ __all__ = [
     "CheckReport",
     "ComTask",
     "Contact",
+    "Curve",
     "DampingTask",
     "Hold",
     "JointLimits",

@@ -10,7 +10,7 @@ the same time law, so that a path of equal end points never swings around them.
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, final
 
@@ -312,6 +312,34 @@ class Waypoints(Path):
     def at(self, t: float) -> Value:
         """See `Path.at`."""
         return _blend(AS_IS, AS_IS, t) if self.spline is None else self.spline(t)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Curve(Path):
+    """Along any curve in `duration` [s], from rest to rest: `curve(s)` for s from 0 to 1, with least jerk.
+
+    Args:
+        curve: share of the way, 0 to 1 -> `pin.SE3`, point (3,) or rotation (3, 3); a pure function.
+        duration: [s].
+    """
+
+    curve: Callable[[float], Value]
+    duration: float
+
+    def __post_init__(self) -> None:
+        seconds = number(self.duration, "Curve.duration", "a finite positive time in seconds", above=0.0)
+        object.__setattr__(self, "duration", seconds)
+        if not callable(self.curve):
+            raise SpecError(f"Curve.curve: expected a function of the share of the way, got {self.curve!r}")
+        kinds = [kind_of(checked(self.curve(s), f"Curve.curve({s})")) for s in (0.0, 0.5, 1.0)]
+        object.__setattr__(self, "kind", kinds[0])
+        if len(set(kinds)) > 1:
+            raise SpecError(f"Curve.curve: its values are of different kinds: {', '.join(map(str, kinds))}")
+
+    def at(self, t: float) -> Value:
+        """See `Path.at`."""
+        return checked(self.curve(min_jerk(t / self.duration)), f"Curve at {t:.4g} s")
 
 
 @final

@@ -90,7 +90,7 @@ class Plan:
 def plan(
     robot: Robot,
     script: Script | Phase,
-    start: State | str | Array = "stand",
+    start: State | str | Array | None = None,
     dt: float = 0.01,
     backend: str = "proxqp",
     *,
@@ -104,7 +104,7 @@ def plan(
     Args:
         robot: the robot.
         script: phases, or one phase.
-        start: a state, the name of a pose, or (nq,).
+        start: a state, the name of a pose, or (nq,); by default where the script starts, as in pose 'stand'.
         dt: length of a tick [s].
         backend: 'proxqp' or 'placo'.
         task: name for the bundle.
@@ -119,6 +119,7 @@ def plan(
     """
     script = script if isinstance(script, Script) else Script(script)
     dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
+    start = script.start if start is None else start
     state = start if isinstance(start, State) else robot.state(start)
     if list(state.model.names) != list(robot.model.names):  # its q may be of the same size
         raise SpecError(f"start: a state of '{state.model.name}', expected one of '{robot.name}'")
