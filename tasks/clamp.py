@@ -29,7 +29,7 @@ REAR_AND_ARMS = ("limb1_foot", "limb2_foot", "leg4_foot", "leg5_foot")
 
 BOX_SIZE = (0.25, 0.15, 0.12)  # [m]
 BACK = -0.01  # where the body is kept [m] along y while the arms are ahead of it
-TALL = 0.275  # body height [m] for stepping: the shanks' limit of 60 degrees leaves a lower body's feet no room to rise
+TALL = 0.275  # body height [m] for stepping: lower down, the shanks' limit leaves feet no room to rise
 STEP = 0.03  # how high feet rise [m]
 
 
@@ -69,7 +69,7 @@ def script(
         return wb.Phase(
             name,
             contacts=[wb.Contact(foot, friction=friction) for foot in feet],
-            roles={limb: role for limb in ARMS},
+            roles=dict.fromkeys(ARMS, role),
             limits=limits,
             duration=seconds,
             **fields,
@@ -113,7 +113,10 @@ def script(
     def carry(name: str, path: wb.Path, seconds: float) -> wb.Phase:
         """The box, clamped between both palms, along a path."""
         return phase(
-            name, CARRIERS, "arm", seconds,
+            name,
+            CARRIERS,
+            "arm",
+            seconds,
             carried=[wb.Carried(box, by="limb1_tip")],
             hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
             soft=[wb.PoseTask("box", path, weight=(100.0, 50.0)), *free_body(seconds)],
@@ -135,7 +138,11 @@ def script(
         ),
     )
     shoulder, elbow, wrist = ("joint1", "joint2", "joint3"), ("joint4",), ("joint5",)
-    folding = {f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, 0.0, 0.8) for limb in ARMS for joint in ("joint5", "finger_a", "finger_b")}
+    folding = {
+        f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, 0.0, 0.8)
+        for limb in ARMS
+        for joint in ("joint5", "finger_a", "finger_b")
+    }
     unfolding = {
         f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, value, 1.6)
         for limb in ARMS
@@ -150,7 +157,9 @@ def script(
         # (c) limbs 1 and 2 lift and become arms: elbow and shank first, then wrist and fingers
         phase("c lift", CARRIERS, "leg", 0.8, hard=feet_to(raised, 0.8), soft=free_body(0.8)),
         phase("c raise", CARRIERS, "leg", 1.2, soft=[arms(shoulder, 1.2), *free_body(1.2)]),
-        phase("c unfold", CARRIERS, "leg", 1.6, driven=unfolding, soft=[arms(shoulder, 1.6), *free_body(1.6)]),
+        phase(
+            "c unfold", CARRIERS, "leg", 1.6, driven=unfolding, soft=[arms(shoulder, 1.6), *free_body(1.6)]
+        ),
         phase("c open", CARRIERS, "arm", 1.2, soft=[arms((*shoulder, *elbow, *wrist), 1.2), *free_body(1.2)]),
         # (d) both palms reach the box and clamp it
         phase("d reach", CARRIERS, "arm", 2.5, soft=[*palms(0.04, 2.5), *free_body(2.5)]),
@@ -161,12 +170,34 @@ def script(
         # (f) put it down; arms back and folded: wrist and fingers first, then elbow and shank
         carry("f lower", wb.MinJerk(wb.AS_IS, box.pose, 2.0), 2.2),
         phase("f release", CARRIERS, "arm", 1.0, soft=[*palms(0.04, 1.0), *free_body(1.0)]),
-        phase("f withdraw", CARRIERS, "arm", 2.0, soft=[arms((*shoulder, *elbow, *wrist), 2.0), *free_body(2.0)]),
-        phase("f close", CARRIERS, "arm", 0.8, driven=folding, soft=[arms((*shoulder, *elbow), 0.8), *free_body(0.8)]),
+        phase(
+            "f withdraw", CARRIERS, "arm", 2.0, soft=[arms((*shoulder, *elbow, *wrist), 2.0), *free_body(2.0)]
+        ),
+        phase(
+            "f close",
+            CARRIERS,
+            "arm",
+            0.8,
+            driven=folding,
+            soft=[arms((*shoulder, *elbow), 0.8), *free_body(0.8)],
+        ),
         phase("f fold", CARRIERS, "leg", 1.6, soft=[arms(shoulder, 1.6), *free_body(1.6)]),
         # (g) limbs 1 and 2 return to the ground
-        phase("g lower", CARRIERS, "leg", 1.5, soft=[_posture(legs_under, 1.5, 1.0, name="limbs"), *body(TALL, 1.2)]),
-        phase("g touch", CARRIERS, "leg", 0.8, hard=feet_to({foot: home[foot] for foot in raised}, 0.8), soft=body(TALL, 0.8)),
+        phase(
+            "g lower",
+            CARRIERS,
+            "leg",
+            1.5,
+            soft=[_posture(legs_under, 1.5, 1.0, name="limbs"), *body(TALL, 1.2)],
+        ),
+        phase(
+            "g touch",
+            CARRIERS,
+            "leg",
+            0.8,
+            hard=feet_to({foot: home[foot] for foot in raised}, 0.8),
+            soft=body(TALL, 0.8),
+        ),
         # (h) legs 3 and 6 step back
         phase("h step back", REAR_AND_ARMS, "leg", 1.5, hard=step_to(home, 1.5), soft=body(TALL, 1.5)),
         # (i) six-legged stance
@@ -180,9 +211,13 @@ def _pose(xyz: Iterable[float], rpy_deg: tuple[float, float, float] = (0.0, 0.0,
     return pin.SE3(pin.exp3(np.radians(rpy_deg)), np.array(tuple(xyz)))
 
 
-def _posture(joints: Mapping[str, float], seconds: float, weight: float, name: str = "posture") -> wb.PostureTask:
+def _posture(
+    joints: Mapping[str, float], seconds: float, weight: float, name: str = "posture"
+) -> wb.PostureTask:
     """Joints from where they are to their values, from rest to rest."""
     return wb.PostureTask(
         {joint: wb.MinJerk(wb.AS_IS, value, seconds) for joint, value in joints.items()},
-        weight=weight, gain=10.0, name=name,
+        weight=weight,
+        gain=10.0,
+        name=name,
     )

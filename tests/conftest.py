@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from hypothesis import settings
 from rich.console import Console
 
+from wbplan.bundle import Bundle
 from wbplan.papers import summary
 
 # The same examples each time: a red run can be run again, and a slow machine is no failure.
@@ -19,6 +22,24 @@ settings.load_profile("wbplan")
 def root() -> Path:
     """The repository's folder."""
     return Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def machine() -> ModuleType:
+    """A small four-legged robot and plans of it, for the tests of bundle, checks and plots."""
+    spec = spec_from_file_location("machine", Path(__file__).parent / "bundle" / "machine.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def good(machine: ModuleType) -> Bundle:
+    """A plan that keeps every promise."""
+    return machine.build()
+
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

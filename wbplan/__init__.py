@@ -1,5 +1,6 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
+from wbplan.active import Active
 from wbplan.bodies import Body, Carried
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
@@ -15,7 +16,7 @@ from wbplan.errors import (
     WbplanError,
 )
 from wbplan.limits import JointLimits, SupportPolygon
-from wbplan.paths import AS_IS, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
+from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
 from wbplan.script import Phase, Script
@@ -30,7 +31,7 @@ from wbplan.tasks import (
     RelativePoseTask,
     Task,
 )
-from wbplan.tick import Active, Loop, Tick
+from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION as __version__
 
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "CheckReport",
     "ComTask",
     "Contact",
+    "Curve",
     "DampingTask",
     "Hold",
     "JointLimits",
@@ -72,8 +74,8 @@ __all__ = [
     "Tick",
     "Trajectory",
     "ViewError",
-    "WbplanError",
     "Waypoints",
+    "WbplanError",
     "__version__",
     "check",
     "load_robot",

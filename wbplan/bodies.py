@@ -15,6 +15,9 @@ from wbplan.paths import AS_IS, POINT, POSE, AsIs, checked, kind_of, name_of, nu
 from wbplan.robot import Robot
 from wbplan.state import State, find_frame
 
+#: How far [m or rad] from where it stands a body may be taken up.
+JUMP = 5e-5
+
 
 @final
 @dataclass(frozen=True)
@@ -106,6 +109,22 @@ def frame_number(model: pin.Model, name: str, what: str) -> int:
         raise SpecError(f"{what}: {error}") from None
 
 
+def _refuse_jump(pose: Any, as_it_is: Any, what: str) -> None:
+    """An object that stands somewhere is taken where it stands."""
+    if as_it_is is None:
+        return
+    off = pin.log6(as_it_is.actInv(pose))
+    gap, turn = (
+        float(np.linalg.norm(as_it_is.translation - pose.translation)),
+        float(np.linalg.norm(off.angular)),
+    )
+    if gap > JUMP or turn > JUMP:
+        raise SpecError(
+            f"{what}: {gap:.4g} m and {turn:.4g} rad from where the body is when the phase begins; "
+            "bring its holder there first, or take it as it is (wb.AS_IS)"
+        )
+
+
 def with_carried(
     robot: Robot, carried: Sequence[Carried], q: NDArray[np.float64], placed: Mapping[str, Any], what: str
 ) -> tuple[pin.Model, tuple[Held, ...]]:
@@ -119,7 +138,7 @@ def with_carried(
         what: the field, for messages.
 
     Raises:
-        SpecError: a holder does not exist, or a body has a frame's name.
+        SpecError: a holder does not exist, a body has a frame's name, or would jump into its holder.
     """
     if not carried:
         return robot.model, ()
@@ -132,12 +151,12 @@ def with_carried(
         holder = model.frames[by]
         if model.existFrame(body.name):
             raise SpecError(f"{what}: body '{body.name}' has the name of a frame of {robot.name}")
-        if item.pose is not AS_IS:
-            pose = item.pose
-        elif body.name in placed:
-            pose = state.pose(item.by).actInv(placed[body.name])
+        as_it_is = state.pose(item.by).actInv(placed[body.name]) if body.name in placed else None
+        if item.pose is AS_IS:
+            pose = pin.SE3.Identity() if as_it_is is None else as_it_is
         else:
-            pose = pin.SE3.Identity()
+            pose = item.pose
+            _refuse_jump(pose, as_it_is, f"{what}: body '{body.name}'.pose")
         placement = holder.placement * pose
         x, y, z = body.size
         inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()

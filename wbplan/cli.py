@@ -163,7 +163,7 @@ def run(
     )
     checked.require()
     if view:
-        play(saved, HOST, package_dirs=robot.package_dirs)
+        play(saved, HOST, package_dirs=(robot.urdf_path.parent, *robot.package_dirs))
 
 
 @app.command()

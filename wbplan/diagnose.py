@@ -62,7 +62,8 @@ def solve_error(stack: Stack, what: str) -> SolveError:
     phase = stack.phase.phase.name
     if not clashes:
         return SolveError(f"phase '{phase}': {what}, although the hard rows do not contradict each other")
-    parts = f"phase '{phase}': {what}; no step keeps all of: {'; '.join(str(c) for c in clashes)} (least relaxations)"
+    named = "; ".join(str(clash) for clash in clashes)
+    parts = f"phase '{phase}': {what}; no step keeps all of: {named} (least relaxations)"
     if limits:
         parts += f"; against the limits: {', '.join(limits)}"
     return SolveError(parts, clashes, limits)

@@ -56,9 +56,7 @@ class SolveError(WbplanError):
         limits: names of the limits that stand against them.
     """
 
-    def __init__(
-        self, message: str, clashes: Sequence[Relaxation] = (), limits: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, message: str, clashes: Sequence[Relaxation] = (), limits: Sequence[str] = ()) -> None:
         self.clashes = tuple(clashes)
         self.limits = tuple(limits)
         super().__init__(message)

@@ -28,7 +28,7 @@ SMALL_TURN = 1e-4
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def rotation_log(r: Any, out: Any) -> None:
-    """Rotation vector [rad] of a rotation matrix (3, 3), by way of its quaternion: exact up to half a turn."""
+    """Rotation vector [rad] of a rotation (3, 3), by way of its quaternion: exact up to half a turn."""
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     if trace > 0.0:
         s = 2.0 * math.sqrt(trace + 1.0)
@@ -63,7 +63,11 @@ def log_derivative(e: Any, out: Any) -> None:
     else:
         angle = math.sqrt(square)
         c = 1.0 / square - (1.0 + math.cos(angle)) / (2.0 * angle * math.sin(angle))
-    out[0, 0], out[1, 1], out[2, 2] = 1.0 - c * (y * y + z * z), 1.0 - c * (x * x + z * z), 1.0 - c * (x * x + y * y)
+    out[0, 0], out[1, 1], out[2, 2] = (
+        1.0 - c * (y * y + z * z),
+        1.0 - c * (x * x + z * z),
+        1.0 - c * (x * x + y * y),
+    )
     out[0, 1], out[1, 0] = -0.5 * z + c * x * y, 0.5 * z + c * x * y
     out[0, 2], out[2, 0] = 0.5 * y + c * x * z, -0.5 * y + c * x * z
     out[1, 2], out[2, 1] = -0.5 * x + c * y * z, 0.5 * x + c * y * z
@@ -71,12 +75,24 @@ def log_derivative(e: Any, out: Any) -> None:
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def measure(
-    p: Any, r: Any, com: Any, place: Any, place_goal: Any, turn: Any, turn_goal: Any, com_goal: Any,
-    chosen: Any, n_hard: int, all_error: Any, error: Any, normals: Any, offsets: Any,
+    p: Any,
+    r: Any,
+    com: Any,
+    place: Any,
+    place_goal: Any,
+    turn: Any,
+    turn_goal: Any,
+    com_goal: Any,
+    chosen: Any,
+    n_hard: int,
+    all_error: Any,
+    error: Any,
+    normals: Any,
+    offsets: Any,
 ) -> tuple[float, float]:
     """Errors, target minus actual along the root's axes, of every target and of the rows chosen from them.
 
-    Args:
+    Shapes:
         p: (F, 3) [m], r: (F, 3, 3): poses of the frames read. com: (3,) [m].
         place: (K, 2) frame and root of each position target; place_goal: (K, 3) [m], in the root.
         turn: (T, 2) frame and root of each rotation target; turn_goal: (T, 3, 3), in the root.
@@ -149,8 +165,17 @@ def wrenches(p: Any, r: Any, place: Any, turn: Any, turn_error: Any, chosen: Any
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def rows(
-    jacobian: Any, com_jacobian: Any, wrench: Any, mask: Any, chosen: Any, frame_groups: int,
-    free: Any, driven: Any, driven_step: Any, out: Any, given: Any,
+    jacobian: Any,
+    com_jacobian: Any,
+    wrench: Any,
+    mask: Any,
+    chosen: Any,
+    frame_groups: int,
+    free: Any,
+    driven: Any,
+    driven_step: Any,
+    out: Any,
+    given: Any,
 ) -> None:
     """Rows (n, nf) over the free columns, and what the driven columns give each row in this tick (n,)."""
     for n in range(chosen.shape[0]):
@@ -171,8 +196,12 @@ def rows(
                 out[n, c] = 0.0
             else:
                 out[n, c] = sign * (
-                    w0 * jacobian[0, column] + w1 * jacobian[1, column] + w2 * jacobian[2, column]
-                    + w3 * jacobian[3, column] + w4 * jacobian[4, column] + w5 * jacobian[5, column]
+                    w0 * jacobian[0, column]
+                    + w1 * jacobian[1, column]
+                    + w2 * jacobian[2, column]
+                    + w3 * jacobian[3, column]
+                    + w4 * jacobian[4, column]
+                    + w5 * jacobian[5, column]
                 )
         for c in range(driven.shape[0]):
             column = driven[c]
@@ -184,12 +213,23 @@ def rows(
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def cost(
-    soft: Any, weight: Any, rhs: Any, error: Any, curvature: Any, diagonal: Any,
-    stiffness: Any, pull: Any, goal: Any, step: Any, joints: Any, H: Any, g: Any,
+    soft: Any,
+    weight: Any,
+    rhs: Any,
+    error: Any,
+    curvature: Any,
+    diagonal: Any,
+    stiffness: Any,
+    pull: Any,
+    goal: Any,
+    step: Any,
+    joints: Any,
+    H: Any,
+    g: Any,
 ) -> float:
     """H and g of 1/2 |weight (J x - rhs)|^2 over soft rows, the diagonal, and the posture tasks.
 
-    Args:
+    Shapes:
         soft: (s, nf) rows; weight, rhs, error, curvature: (s,).
         diagonal: (nf,) what always stands on H's diagonal.
         stiffness, goal, step: (t, nf - 6) of each posture task; pull: (t,); joints: (nf - 6,) where they are.
@@ -235,8 +275,17 @@ def box(q: Any, q_index: Any, q_lower: Any, q_upper: Any, reach: Any, lower: Any
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def polygon(
-    normals: Any, offsets: Any, com: Any, com_jacobian: Any, free: Any, driven: Any, driven_step: Any,
-    margin: float, least: float, C: Any, d: Any,
+    normals: Any,
+    offsets: Any,
+    com: Any,
+    com_jacobian: Any,
+    free: Any,
+    driven: Any,
+    driven_step: Any,
+    margin: float,
+    least: float,
+    C: Any,
+    d: Any,
 ) -> None:
     """C and d of N (c + J x) <= offsets - margin, where d is never below `least` [m]."""
     for e in range(offsets.shape[0]):

@@ -8,7 +8,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop
@@ -51,8 +50,7 @@ class LiveView:
         self._next = t + EVERY
         compiled, stack = loop.compiled, loop.stack
         phase, polygon, margin = compiled.phase, compiled.polygon, compiled.margin
-        places = stack.kinematics.data.oMf
-        self._bodies.update({h.body.name: pin.SE3ToXYZQUAT(places[h.frame]) for h in compiled.held})
+        self._bodies.update(loop.bodies())
         self._scene.update(
             loop.q,
             contacts=[
@@ -65,21 +63,6 @@ class LiveView:
             margin=stack.margin if polygon is not None else None,
             required=margin or 0.0,
             bodies=self._bodies,
-            targets=_asked(loop),
+            targets=loop.targets(),
             label=f"{phase.name}\nt = {t:.1f} s",
         )
-
-
-def _asked(loop: Loop) -> dict[str, Array]:
-    """World poses that tasks ask for now, by task; a point is given the world's orientation."""
-    asked = {}
-    for target in loop.compiled.frame_targets:
-        value = target.path.at(loop.t)
-        if target.root != WORLD or target.label.startswith("contact("):
-            continue
-        if not isinstance(value, pin.SE3):
-            if np.shape(value) != (3,):
-                continue
-            value = pin.SE3(np.eye(3), np.asarray(value))
-        asked[target.label] = pin.SE3ToXYZQUAT(value)
-    return asked

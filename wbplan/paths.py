@@ -10,17 +10,16 @@ the same time law, so that a path of equal end points never swings around them.
 from __future__ import annotations
 
 import abc
-from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, final
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from wbplan.errors import SpecError
+from wbplan.splines import Spline
 
 Array = NDArray[np.float64]
 Value = Any  # pin.SE3 or Array: pinocchio ships no types
@@ -97,15 +96,12 @@ def number(
 ) -> float:
     """A finite number, `least` or more and more than `above`; refused with a `SpecError` if it is not."""
     scalar = numeric(value)
-    if (
-        scalar is not None
-        and scalar.shape == ()
-        and np.isfinite(scalar)
-        and scalar >= least
-        and scalar > above
-    ):
-        return float(scalar)
-    raise SpecError(f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}")
+    found = float(scalar) if scalar is not None and scalar.shape == () else np.nan
+    if not (np.isfinite(found) and found >= least and found > above):
+        raise SpecError(
+            f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}"
+        )
+    return found
 
 
 def name_of(value: object, what: str) -> str:
@@ -128,29 +124,24 @@ def _start(here: Value, kind: str | None) -> Value:
     return here.rotation if kind == ROTATION and isinstance(here, pin.SE3) else here
 
 
-def _turned(start: Array, goal: Array, s: float) -> Array:
-    turned: Array = start @ pin.exp3(s * pin.log3(start.T @ goal))
-    return turned
-
-
 def _blend(start: Value, goal: Value, s: float) -> Value:
     """The point a fraction `s` of the way from `start` to `goal`."""
     if start is AS_IS or goal is AS_IS:
         raise SpecError("a path from or to AS_IS has a value only once its phase begins (or after `bind`)")
     if isinstance(start, pin.SE3):
         along = (1.0 - s) * start.translation + s * goal.translation
-        return pin.SE3(_turned(start.rotation, goal.rotation, s), along)
+        return pin.SE3(_blend(start.rotation, goal.rotation, s), along)
     if start.shape == (3, 3):
-        return _turned(start, goal, s)
+        return start @ pin.exp3(s * pin.log3(start.T @ goal))
     return start + s * (goal - start)
 
 
 class Path(abc.ABC):
     """A target over time. `at(t)` is defined for every t >= 0: a path rests at its end."""
 
-    #: Whether the value may change between two calls with the same time (only `Live`).
+    #: Whether the value may change between two calls with the same time, as a slider's or a device's does.
+    #: Other paths are read many ticks ahead.
     live: bool = False
-
     #: What its values are, in the words of messages; `None` where that is not known before `bind`.
     kind: str | None = None
 
@@ -291,7 +282,7 @@ class Waypoints(Path):
 
     times: tuple[float, ...]
     points: tuple[Value, ...]
-    spline: _Spline | None = field(init=False, repr=False, default=None)
+    spline: Spline | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         for name in ("times", "points"):
@@ -309,7 +300,7 @@ class Waypoints(Path):
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "points", points)
         if not any(p is AS_IS for p in points):
-            object.__setattr__(self, "spline", _Spline(times, points))
+            object.__setattr__(self, "spline", Spline(times, points))
 
     def bind(self, here: Value) -> Path:
         """See `Path.bind`."""
@@ -324,57 +315,31 @@ class Waypoints(Path):
 
 
 @final
-class _Spline:
-    """The clamped cubic spline through points of one kind.
+@dataclass(frozen=True, eq=False)
+class Curve(Path):
+    """Along any curve in `duration` [s], from rest to rest: `curve(s)` for s from 0 to 1, with least jerk.
 
-    Attributes:
-        first: the first point, in whose tangent space rotations are splined.
+    Args:
+        curve: share of the way, 0 to 1 -> `pin.SE3`, point (3,) or rotation (3, 3); a pure function.
+        duration: [s].
     """
 
-    def __init__(self, times: tuple[float, ...], points: tuple[Value, ...]) -> None:
-        self.first, self._times = points[0], times
-        if isinstance(self.first, pin.SE3):
-            turns = _rotation_vectors([p.rotation for p in points])
-            rows = np.column_stack([[p.translation for p in points], turns])
-        else:
-            rows = _rotation_vectors(points) if self.first.shape == (3, 3) else np.array(points)
-        self._curve = CubicSpline(np.array(times), rows, bc_type="clamped")
-        self._pieces = [tuple(self._curve.c[:, i]) for i in range(len(times) - 1)]
+    curve: Callable[[float], Value]
+    duration: float
 
-    def rows(self, times: Array) -> Array:
-        """(N, ...) coordinates at times (N,) [s]: of a pose, its origin and its rotation vector."""
-        rows: Array = self._curve(np.clip(times, 0.0, self._times[-1]))
-        return rows
+    def __post_init__(self) -> None:
+        seconds = number(self.duration, "Curve.duration", "a finite positive time in seconds", above=0.0)
+        object.__setattr__(self, "duration", seconds)
+        if not callable(self.curve):
+            raise SpecError(f"Curve.curve: expected a function of the share of the way, got {self.curve!r}")
+        kinds = [kind_of(checked(self.curve(s), f"Curve.curve({s})")) for s in (0.0, 0.5, 1.0)]
+        object.__setattr__(self, "kind", kinds[0])
+        if len(set(kinds)) > 1:
+            raise SpecError(f"Curve.curve: its values are of different kinds: {', '.join(map(str, kinds))}")
 
-    def __call__(self, t: float) -> Value:
-        t = min(max(t, 0.0), self._times[-1])
-        piece = min(bisect_right(self._times, t), len(self._pieces)) - 1
-        a, b, c, d = self._pieces[piece]
-        s = t - self._times[piece]
-        row = ((a * s + b) * s + c) * s + d
-        if isinstance(self.first, pin.SE3):
-            return pin.SE3(self.first.rotation @ pin.exp3(row[3:]), row[:3])
-        return self.first @ pin.exp3(row) if self.first.shape == (3, 3) else row
-
-
-def _rotation_vectors(rotations: Sequence[Array]) -> Array:
-    """(N, 3) [rad], about the axes of the first rotation; each the one nearest to that before it.
-
-    A rotation by `angle` about `axis` is one by `angle + 2 pi k` too.
-    """
-    vectors = [np.zeros(3)]
-    for i, rotation in enumerate(rotations[1:], 1):
-        if np.linalg.norm(pin.log3(rotations[i - 1].T @ rotation)) > np.pi - 1e-6:
-            raise SpecError(
-                f"Waypoints.points[{i}]: turned by half a turn against points[{i - 1}], so that the way "
-                "round is open; put a point between"
-            )
-        vector = pin.log3(rotations[0].T @ rotation)
-        angle = float(np.linalg.norm(vector))
-        axis = vector / angle if angle > 1e-9 else vectors[-1] / max(float(np.linalg.norm(vectors[-1])), 1e-9)
-        vector = vector + axis * 2.0 * np.pi * np.round((vectors[-1] - vector) @ axis / (2.0 * np.pi))
-        vectors.append(vector)
-    return np.array(vectors)
+    def at(self, t: float) -> Value:
+        """See `Path.at`."""
+        return checked(self.curve(min_jerk(t / self.duration)), f"Curve at {t:.4g} s")
 
 
 @final

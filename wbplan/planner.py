@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
-from wbplan.errors import SolveError, SpecError
+from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.paths import number
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
@@ -89,7 +90,7 @@ class Plan:
 def plan(
     robot: Robot,
     script: Script | Phase,
-    start: State | str | Array = "stand",
+    start: State | str | Array | None = None,
     dt: float = 0.01,
     backend: str = "proxqp",
     *,
@@ -103,7 +104,7 @@ def plan(
     Args:
         robot: the robot.
         script: phases, or one phase.
-        start: a state, the name of a pose, or (nq,).
+        start: a state, the name of a pose, or (nq,); by default where the script starts, as in pose 'stand'.
         dt: length of a tick [s].
         backend: 'proxqp' or 'placo'.
         task: name for the bundle.
@@ -118,16 +119,21 @@ def plan(
     """
     script = script if isinstance(script, Script) else Script(script)
     dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
+    start = script.start if start is None else start
     state = start if isinstance(start, State) else robot.state(start)
     if list(state.model.names) != list(robot.model.names):  # its q may be of the same size
         raise SpecError(f"start: a state of '{state.model.name}', expected one of '{robot.name}'")
     q, roles = np.array(state.q), None
     _inside_limits(robot, q)
+    placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
+    _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
     started = time.perf_counter()
     recorder = Recorder(robot, script, dt)
-    placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
     done = 0  # ticks
+    for phase in script.phases:
+        if phase.joint_limits is None:
+            raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
         loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles)
         _promises_hold(loop, phase)
@@ -153,6 +159,17 @@ def plan(
         progress(1.0, "done")
     bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
     return Plan(robot, bundle)
+
+
+def _compile_kernels(
+    robot: Robot, phase: Phase, q: Array, dt: float, backend: str, placed: Mapping[str, Any]
+) -> None:
+    """One tick thrown away: the first one of a machine compiles the kernels, seconds that are not planning.
+
+    What is wrong with the phase is said when it is planned.
+    """
+    with contextlib.suppress(WbplanError):
+        Loop(robot, phase, q, dt, backend=backend, placed=placed).step()
 
 
 def _inside_limits(robot: Robot, q: Array) -> None:

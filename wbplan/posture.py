@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.compiled import JointTarget
-from wbplan.paths import MinJerk
+from wbplan.paths import MinJerk, number
 
 Array = NDArray[np.float64]
 
@@ -20,10 +20,12 @@ class Posture:
     Attributes:
         label: of the task.
         stiffness: (nf - 6,) squared weights; pull: fraction of the error removed per tick.
-        goal: (nf - 6,) target now; step: how far it moved in the last `advance`. Both views of what was given.
+        goal: (nf - 6,) target now; step: how far it moved in the last `advance`; views of what was given.
     """
 
-    def __init__(self, target: JointTarget, free: NDArray[np.intp], dt: float, goal: Array, step: Array) -> None:
+    def __init__(
+        self, target: JointTarget, free: NDArray[np.intp], dt: float, goal: Array, step: Array
+    ) -> None:
         self.label = target.label
         column = {int(c) - 6: k for k, c in enumerate(free[6:])}
         self.stiffness: Array = target.weight[free[6:] - 6] ** 2
@@ -47,7 +49,7 @@ class Posture:
             s = np.minimum(t / self._duration, 1.0)
             self.goal[self._ramps] = self._from + self._way * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
         for k, path in self._others:
-            self.goal[k] = float(path.at(t))
+            self.goal[k] = number(path.at(t), f"{self.label} at {t:.4g} s", "a finite joint position")
         self.step[:] = 0.0
 
     def advance(self, t: float) -> None:
@@ -58,6 +60,6 @@ class Posture:
             np.subtract(self.goal, before, out=self.step)
 
     def next_goal(self, joints: Array) -> Array:
-        """(nf - 6,) where the next step should lead from `joints`: short of the target by the error that stays."""
+        """(nf - 6,) where a step from `joints` should lead: short of the target by the error that stays."""
         goal: Array = self.goal - (1.0 - self.pull) * (self.goal - self.step - joints)
         return goal

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, final
 
@@ -35,12 +34,11 @@ class Solution:
 
     Attributes:
         step: (nv,) tangent step dq over one tick [m, rad].
-        multipliers: gives what held the step back, until the backend solves again; None where the backend
-            has no multipliers.
+        multipliers: what held the step back; None where the backend has none.
     """
 
     step: Array
-    multipliers: Callable[[], Multipliers] | None = None
+    multipliers: Multipliers | None = None
 
 
 class Backend(Protocol):

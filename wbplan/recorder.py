@@ -10,7 +10,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
-from wbplan.compiled import WORLD
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop, Tick
@@ -34,6 +33,7 @@ class Recorder:
         self._margin: list[float] = []
         self._phase: list[int] = []
         self._errors: list[dict[str, float]] = []
+        self._worst: dict[str, float] = {}
         self._targets: list[dict[str, Array]] = []
         self._bodies: list[dict[str, Array]] = []
         self._microseconds: list[float] = []
@@ -74,9 +74,12 @@ class Recorder:
         self._com.append(stack.kinematics.com.copy())
         self._margin.append(stack.margin)
         self._phase.append(index)
-        self._errors.append(stack.errors())
-        self._targets.append(_targets(loop))
-        self._bodies.append({**self._placed, **_held(loop)})
+        errors = stack.errors()
+        self._errors.append(errors)
+        for name, error in errors.items():
+            self._worst[name] = max(error, self._worst.get(name, 0.0))
+        self._targets.append(loop.targets())
+        self._bodies.append({**self._placed, **loop.bodies()})
 
     def end(self, index: int, loop: Loop, elapsed: float) -> None:
         """A phase is over: its entry in plan.json."""
@@ -141,7 +144,7 @@ class Recorder:
             "ticks": len(microseconds),
             "median_us": float(np.median(microseconds)),
             "p99_us": float(np.percentile(microseconds, 99)),
-            "worst": {name: float(np.nanmax(column)) for name, column in trajectory.errors.items()},
+            "worst": dict(self._worst),
             "warnings": list(dict.fromkeys(self._warnings)),
         }
         plan = {
@@ -167,26 +170,3 @@ def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:
         for name, value in sample.items():
             columns[name][k] = value
     return columns
-
-
-def _targets(loop: Loop) -> dict[str, Array]:
-    """World poses asked for now, by task; a point's orientation is the world's."""
-    found = {}
-    for target in loop.compiled.frame_targets:
-        if target.root != WORLD or target.label.startswith("contact("):
-            continue
-        value = target.path.at(loop.t)
-        if not isinstance(value, pin.SE3):
-            if np.shape(value) != (3,):
-                continue
-            value = pin.SE3(np.eye(3), np.asarray(value))
-        found[target.label] = pin.SE3ToXYZQUAT(value)
-    return found
-
-
-def _held(loop: Loop) -> dict[str, Array]:
-    compiled = loop.compiled
-    if not compiled.held:
-        return {}
-    oMf = loop.stack.kinematics.data.oMf
-    return {h.body.name: pin.SE3ToXYZQUAT(oMf[h.frame]) for h in compiled.held}

@@ -10,13 +10,19 @@ import pinocchio as pin
 import proxsuite
 from numpy.typing import NDArray
 
-from wbplan.stack import Stack
+from wbplan.stack import UNBOUNDED, Stack
 
 Array = NDArray[np.float64]
 
 #: Drift of a hard row [m or rad] that is left to the next tick.
 DRIFT = 1e-5
+
+#: Most corrections in one tick.
 MOST = 4
+
+#: Singular values of the hard rows below this share of the largest are left alone: a loop at a singular
+#: configuration is not opened by what it cannot close.
+SINGULAR = 1e-6
 
 
 @final
@@ -27,7 +33,7 @@ class Retraction:
         self._stack = stack
 
     def correct(self, q: Array, new: Array, kept: Callable[[], bool], *, recovering: bool) -> Array:
-        """Correct `new`, which a step from `q` led to, at most a few times; the stack then measures the result.
+        """Correct `new`, which a step from `q` led to, a few times at most; the stack measures the result.
 
         Args:
             q: (nq,) where the tick started.
@@ -65,15 +71,18 @@ class Retraction:
         return low, high
 
     def _solve(self, lower: Array, upper: Array) -> Array | None:
+        """The least step onto the hard rows: by least squares where no bound is in its way."""
         stack = self._stack
+        lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+        least = np.asarray(np.linalg.lstsq(stack.A, stack.b, rcond=SINGULAR)[0], dtype=np.float64)
+        if (lower <= least).all() and (least <= upper).all() and (stack.C @ least <= stack.d).all():
+            return least
         n, edges = len(stack.g), len(stack.d)
         qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
         qp.settings.eps_abs = 1e-9
         qp.settings.primal_infeasibility_solving = True
-        qp.init(
-            np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, np.full(edges, -1e20), stack.d,
-            np.minimum(lower, 0.0), np.maximum(upper, 0.0),
-        )
+        unbounded = np.full(edges, -UNBOUNDED)
+        qp.init(np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, unbounded, stack.d, lower, upper)
         qp.solve()
-        x = np.array(qp.results.x)
-        return x if np.isfinite(x).all() else None
+        closest: Array = qp.results.x.copy()
+        return closest if np.isfinite(closest).all() else None

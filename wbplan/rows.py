@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from wbplan import kernels
 from wbplan.compiled import WORLD, ComTarget, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.paths import checked
 from wbplan.sampling import sample
 
 Array = NDArray[np.float64]
@@ -36,6 +37,11 @@ def support_mask(model: Any, frame: int) -> Array:
         if joint > 0:
             mask[first : first + model.joints[joint].nv] = 1.0
     return mask
+
+
+def _pairs(targets: Sequence[FrameTarget], slot: dict[int, int]) -> NDArray[np.intp]:
+    """(k, 2) where the frame and the root of each target stand among the frames that are read."""
+    return np.array([(slot[t.frame], slot[t.root]) for t in targets], dtype=np.intp).reshape(-1, 2)
 
 
 @dataclass
@@ -74,21 +80,23 @@ class Rows:
             rotation_error (T, 3) likewise; com_targets, com_goal (M, 3), com_error (M, 3).
     """
 
-    def __init__(self, model: Any, frame_targets: Sequence[FrameTarget], com_targets: Sequence[ComTarget]) -> None:
+    def __init__(
+        self, model: Any, frame_targets: Sequence[FrameTarget], com_targets: Sequence[ComTarget]
+    ) -> None:
         self.frames = sorted({f for t in frame_targets for f in (t.frame, t.root) if f != WORLD})
         slot = {frame: k for k, frame in enumerate([*self.frames, WORLD])}
         self.position_targets = tuple(t for t in frame_targets if (t.position_weight > 0).any())
         self.rotation_targets = tuple(t for t in frame_targets if (t.rotation_weight > 0).any())
         self.com_targets = tuple(com_targets)
         places, turns, coms = len(self.position_targets), len(self.rotation_targets), len(com_targets)
-        pairs = lambda targets: np.array(  # noqa: E731
-            [(slot[t.frame], slot[t.root]) for t in targets], dtype=np.intp
-        ).reshape(-1, 2)
-        self.place, self.turn = pairs(self.position_targets), pairs(self.rotation_targets)
+        self.place, self.turn = _pairs(self.position_targets, slot), _pairs(self.rotation_targets, slot)
         self.position_goal, self.rotation_goal = np.zeros((places, 3)), np.tile(np.eye(3), (turns, 1, 1))
         self.com_goal = np.zeros((coms, 3))
         self.all_error = np.zeros((places + turns + coms, 3))
-        self.position_error, self.rotation_error = self.all_error[:places], self.all_error[places : places + turns]
+        self.position_error, self.rotation_error = (
+            self.all_error[:places],
+            self.all_error[places : places + turns],
+        )
         self.com_error = self.all_error[places + turns :]
         self.frame_groups = places + turns
         self._ahead: _Ahead | None = None
@@ -101,10 +109,15 @@ class Rows:
         places = len(self.position_targets)
         parts: list[tuple[Any, str, int, Array]] = []  # target, part, group, weights
         parts += [(t, "position", k, t.position_weight) for k, t in enumerate(self.position_targets)]
-        parts += [(t, "orientation", places + k, t.rotation_weight) for k, t in enumerate(self.rotation_targets)]
+        parts += [
+            (t, "orientation", places + k, t.rotation_weight) for k, t in enumerate(self.rotation_targets)
+        ]
         parts += [(t, "position", self.frame_groups + k, t.weight) for k, t in enumerate(self.com_targets)]
         parts.sort(key=lambda part: not part[0].hard)
-        chosen, masks, weights, gains = [], [], [], []
+        chosen: list[int] = []
+        masks: list[Array] = []
+        weights: list[float] = []
+        gains: list[float] = []
         self.labels: list[tuple[str, str, slice]] = []
         self.hard = 0
         for target, part, group, weight in parts:
@@ -141,7 +154,7 @@ class Rows:
         self._ahead = None
         self.motion[:] = 0.0
         for path, place, turn, com in self._paths:
-            value = path.at(t)
+            value = checked(path.at(t), f"{type(path).__name__} at {t:.4g} s")
             pose = isinstance(value, pin.SE3)
             if place is not None:
                 self.position_goal[place] = value.translation if pose else value
@@ -168,7 +181,7 @@ class Rows:
 
     def _look_ahead(self, t: float, dt: float) -> _Ahead:
         """Targets of the next ticks, all at once."""
-        times = t + dt * np.arange(STRETCH + 1)
+        times: Array = t + dt * np.arange(STRETCH + 1, dtype=np.float64)
         samples = [(item, sample(item[0], times)) for item in self._moving_paths]
         places = [(place, points) for (_, place, _, _), (points, _) in samples if place is not None]
         turns = [(turn, rotations) for (_, _, turn, _), (_, rotations) in samples if turn is not None]
@@ -193,17 +206,33 @@ class Rows:
         )
 
     def measure(self, kinematics: Kinematics, normals: Array, offsets: Array) -> tuple[float, float]:
-        """Write errors at the kinematics' q; the largest of a hard row, and the least distance to an edge [m]."""
+        """Write errors; returns the largest of a hard row, and the least distance to an edge [m]."""
         drift, margin = kernels.measure(
-            kinematics.translations, kinematics.rotations, kinematics.com, self.place, self.position_goal,
-            self.turn, self.rotation_goal, self.com_goal, self.chosen, self.hard, self.all_error, self.error,
-            normals, offsets,
+            kinematics.translations,
+            kinematics.rotations,
+            kinematics.com,
+            self.place,
+            self.position_goal,
+            self.turn,
+            self.rotation_goal,
+            self.com_goal,
+            self.chosen,
+            self.hard,
+            self.all_error,
+            self.error,
+            normals,
+            offsets,
         )
         return drift, margin
 
     def write(self, kinematics: Kinematics) -> None:
         """Write `wrench` for the poses that `measure` saw last."""
         kernels.wrenches(
-            kinematics.translations, kinematics.rotations, self.place, self.turn, self.rotation_error,
-            self.chosen, self.wrench,
+            kinematics.translations,
+            kinematics.rotations,
+            self.place,
+            self.turn,
+            self.rotation_error,
+            self.chosen,
+            self.wrench,
         )

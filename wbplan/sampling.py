@@ -13,7 +13,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wbplan.paths import Line, MinJerk, Path, Swing, Value, Waypoints
+from wbplan.errors import SpecError
+from wbplan.paths import Line, MinJerk, Path, Swing, Value, Waypoints, checked
 
 Array = NDArray[np.float64]
 Samples = tuple[Array, Array]
@@ -29,15 +30,20 @@ def sample(path: Path, times: Array) -> Samples:
 
 
 def _one_by_one(path: Path, times: Array) -> Samples:
-    values = [path.at(float(t)) for t in times]
+    """Any path, a user's own too: what it answers is checked here, once for each time."""
     points, rotations = np.zeros((len(times), 3)), np.tile(np.eye(3), (len(times), 1, 1))
-    for k, value in enumerate(values):
+    for k, t in enumerate(times):
+        value = checked(path.at(float(t)), f"{type(path).__name__} at {t:.4g} s")
         if isinstance(value, pin.SE3):
             points[k], rotations[k] = value.translation, value.rotation
         elif np.shape(value) == (3, 3):
             rotations[k] = value
-        else:
+        elif np.shape(value) == (3,):
             points[k] = value
+        else:
+            raise SpecError(
+                f"{type(path).__name__} at {t:.4g} s: expected a pose, point or rotation, got {value}"
+            )
     return points, rotations
 
 

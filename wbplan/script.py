@@ -13,6 +13,7 @@ from wbplan.contacts import Contact
 from wbplan.errors import SpecError, listing
 from wbplan.limits import JointLimits, SupportPolygon
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
+from wbplan.state import State
 from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 
 Limit = JointLimits | SupportPolygon
@@ -162,12 +163,18 @@ class Script:
     Args:
         phases: one or more, their names all different.
         bodies: objects to show that no phase carries, or that stand somewhere before they are carried.
+        start: the state or the name of the pose that it starts in, unless `plan` is told another.
     """
 
     phases: tuple[Phase, ...]
     bodies: tuple[Body, ...]
+    start: State | str
 
-    def __init__(self, *phases: Phase | Iterable[Phase], bodies: Iterable[Body] = ()) -> None:
+    def __init__(
+        self, *phases: Phase | Iterable[Phase], bodies: Iterable[Body] = (), start: State | str = "stand"
+    ) -> None:
+        if not isinstance(start, State | str):
+            raise SpecError(f"Script.start: expected a State or the name of a pose, got {start!r}")
         flat: list[Phase] = []
         for item in phases:
             flat.extend([item] if isinstance(item, Phase) else _tuple_of(item, Phase, "Script"))
@@ -180,6 +187,7 @@ class Script:
                 raise SpecError(f"Script: two different bodies are named '{body.name}'")
         object.__setattr__(self, "phases", tuple(flat))
         object.__setattr__(self, "bodies", tuple(known.values()))
+        object.__setattr__(self, "start", start)
 
     @property
     def duration(self) -> float:

@@ -14,6 +14,8 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, final
 
 import numpy as np
@@ -22,6 +24,7 @@ from numpy.typing import NDArray
 from wbplan import kernels
 from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.paths import number
 from wbplan.posture import Posture
 from wbplan.rows import Rows
 
@@ -42,7 +45,9 @@ def reach(model: Any, frame: int) -> float:
     if frame == WORLD:
         return 0.0
     joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [model.frames[frame].placement.translation]
+    links = [model.jointPlacements[j].translation for j in joints] + [
+        model.frames[frame].placement.translation
+    ]
     return float(sum(np.linalg.norm(link) for link in links))
 
 
@@ -61,7 +66,7 @@ class Stack:
         damping: what stands on the whole diagonal of H, at the last `assemble`.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
-        postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones; hard_joint_goal: their targets.
+        postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
 
     def __init__(self, phase: CompiledPhase, dt: float) -> None:
@@ -101,7 +106,11 @@ class Stack:
         rows, nf = self.rows, len(self.free)
         soft = slice(rows.hard, len(rows.error))
         count = len(rows.error) - rows.hard
-        self._weight, self._soft_error, self._soft_motion = rows.weight[soft], rows.error[soft], rows.motion[soft]
+        self._weight, self._soft_error, self._soft_motion = (
+            rows.weight[soft],
+            rows.error[soft],
+            rows.motion[soft],
+        )
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
         self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
@@ -112,7 +121,9 @@ class Stack:
             Posture(t, self.free, self.dt, self._posture_goal[k], self._posture_step[k])
             for k, t in enumerate(targets)
         ]
-        self._stiffness = np.array([p.stiffness for p in self.postures]).reshape(-1, nf - 6)
+        self._stiffness = np.zeros((len(targets), nf - 6))
+        for k, posture in enumerate(self.postures):
+            self._stiffness[k] = posture.stiffness
         self._posture_pull = np.array([p.pull for p in self.postures])
         self._diagonal = np.full(nf, REGULARISATION + self.phase.damping)
         self._diagonal[6:] += self._stiffness.sum(axis=0)
@@ -127,7 +138,7 @@ class Stack:
         )  # fmt: skip
 
     def _levers(self, soft: slice) -> Array:
-        """Bound on the curvature of each soft row's error, per unit of error: lever arm [m], or 1 for a rotation."""
+        """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
         for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
@@ -176,16 +187,17 @@ class Stack:
             posture.aim(t)
 
     def advance(self, t: float) -> None:
-        """Move all targets on from time `t` [s] by a tick, keeping how far each goes, and so the driven joints."""
+        """Move all targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
         self.rows.advance(t, self.dt)
         t += self.dt
         for posture in self.postures:
             posture.advance(t)
         q = self.kinematics.q
         for k, driven in self._moving_driven:
-            self.driven_step[k] = float(driven.path.at(t)) - q[7 + driven.joint]
+            goal = number(driven.path.at(t), f"driven joint at {t:.4g} s", "a finite position")
+            self.driven_step[k] = goal - q[7 + driven.joint]
         for i, (joint, path, _) in enumerate(self.hard_joints):
-            self.hard_joint_goal[i] = float(path.at(t))
+            self.hard_joint_goal[i] = number(path.at(t), f"hard posture at {t:.4g} s", "a finite position")
             self.hard_error[self.rows.hard + i] = self.hard_joint_goal[i] - q[7 + joint]
 
     def measure(self, q: Array) -> None:
@@ -227,6 +239,11 @@ class Stack:
             margin + MARGIN_RESERVE, least, self.C, self.d,
         )  # fmt: skip
 
+    def distances(self) -> Array:
+        """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
+        gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
+        return gaps
+
     def fill_box(self) -> None:
         """Fill lower and upper for the current configuration."""
         kernels.box(
@@ -267,7 +284,12 @@ class Stack:
         for label, part, span in self.rows.labels:
             if span.stop <= self.rows.hard:
                 names += [(label, "m" if part == "position" else "rad")] * (span.stop - span.start)
-        return names + [(label, "rad") for _, _, label in self.hard_joints]
+        sliding = {
+            j
+            for j, joint in enumerate(list(self.phase.model.joints)[2:])
+            if "JointModelP" in joint.shortname()
+        }
+        return names + [(label, "m" if j in sliding else "rad") for j, _, label in self.hard_joints]
 
     def edge_names(self) -> list[str]:
         """Name of every support-polygon row: the two feet that its edge joins."""
@@ -287,12 +309,22 @@ class Stack:
 
         Keys: '<label>.position' [m], '<label>.orientation' [rad], '<label>.joints' [rad].
         """
-        error, joints = self.rows.error, self.kinematics.q[self.q_index]
+        return self.keep_errors()()
+
+    def keep_errors(self) -> Callable[[], dict[str, float]]:
+        """`errors` of this moment, to be worked out whenever somebody asks."""
+        joints = self.kinematics.q[self.q_index]
+        return partial(
+            self._name_errors, self.rows.error.copy(), self.hard_error[self.rows.hard :].copy(),
+            self._posture_goal - joints,
+        )  # fmt: skip
+
+    def _name_errors(self, error: Array, hard_joints: Array, postures: Array) -> dict[str, float]:
         found = {f"{label}.{part}": _norm(error[span]) for label, part, span in self.rows.labels}
-        for posture in self.postures:
-            found[f"{posture.label}.joints"] = _norm((posture.goal - joints)[posture.stiffness > 0])
-        for i, (_, _, label) in enumerate(self.hard_joints):
-            key, gap = f"{label}.joints", float(self.hard_error[self.rows.hard + i])
+        for posture, gap in zip(self.postures, postures, strict=True):
+            found[f"{posture.label}.joints"] = _norm(gap[posture.stiffness > 0])
+        for (_, _, label), gap in zip(self.hard_joints, hard_joints, strict=True):
+            key = f"{label}.joints"
             found[key] = float(np.hypot(found.get(key, 0.0), gap))
         return found
 

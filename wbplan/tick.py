@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, final
 
@@ -20,11 +19,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbplan.active import Active, HeldBack
 from wbplan.backends import make_backend
-from wbplan.compiled import CompiledPhase, compile_phase
+from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
-from wbplan.errors import SolveError, SpecError
-from wbplan.qp import Solution
+from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.paths import number
 from wbplan.retract import DRIFT, Retraction
 from wbplan.robot import Robot
 from wbplan.script import Phase
@@ -33,30 +33,8 @@ from wbplan.state import State
 
 Array = NDArray[np.float64]
 
-#: A hard row further off than this [m or rad] after all correction breaks its promise (the checks allow 1e-4 m).
+#: A hard row further off than this [m or rad] after all correction breaks its promise; the checks allow 1e-4.
 PROMISE = 5e-5
-
-#: A multiplier below this share of the soft tasks' pull does not count as holding the robot back.
-FAINT = 1e-3
-
-
-@final
-@dataclass(frozen=True)
-class Active:
-    """A limit or hard row that holds the robot back.
-
-    Attributes:
-        name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
-        kind: 'position', 'speed', 'margin' or 'hard'.
-        multiplier: its Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver gives none.
-    """
-
-    name: str
-    kind: str
-    multiplier: float
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.kind})"
 
 
 @final
@@ -71,22 +49,29 @@ class Tick:
         warning: '' or why a promise is not yet kept, as 'margin not yet reached'.
     """
 
-    __slots__ = ("__dict__", "_loop", "_solution", "_stamp", "com", "margin", "microseconds", "q", "t", "v", "warning")
+    __slots__ = (
+        "__dict__",
+        "_errors",
+        "_held_back",
+        "com",
+        "margin",
+        "microseconds",
+        "q",
+        "t",
+        "v",
+        "warning",
+    )
 
-    def __init__(
-        self, loop: Loop, t: float, q: Array, v: Array, com: Array, margin: float, solution: Solution, seconds: float
-    ) -> None:
-        self._loop, self._solution, self._stamp = loop, solution, loop.count
-        self.t, self.q, self.v, self.com, self.margin = t, q, v, com, margin
-        self.microseconds = 1e6 * seconds
+    def __init__(self, loop: Loop, v: Array, held_back: HeldBack, started: float) -> None:
+        stack = loop.stack
+        self.t, self.q, self.v = loop.t, loop.q, v
+        self.com, self.margin = stack.kinematics.com.copy(), stack.margin
+        self._errors, self._held_back = stack.keep_errors(), held_back
         promised = loop.compiled.margin
         self.warning = ""
-        if promised is not None and margin < promised - 1e-6:
-            self.warning = f"margin not yet reached: {margin:.4f} m of {promised:.4f} m"
-
-    def _fresh(self, what: str) -> None:
-        if self._stamp != self._loop.count:
-            raise SpecError(f"tick.{what}: read it before the loop's next step")
+        if promised is not None and self.margin < promised - 1e-6:
+            self.warning = f"margin not yet reached: {self.margin:.4f} m of {promised:.4f} m"
+        self.microseconds = 1e6 * (time.perf_counter() - started)
 
     @cached_property
     def errors(self) -> Mapping[str, float]:
@@ -94,14 +79,12 @@ class Tick:
 
         Keys: '<task>.position' [m], '<task>.orientation' [rad], '<task>.joints' [rad].
         """
-        self._fresh("errors")
-        return self._loop.stack.errors()
+        return self._errors()
 
     @cached_property
     def active(self) -> tuple[Active, ...]:
         """Limits and hard rows that held the robot back in this step, the strongest first."""
-        self._fresh("active")
-        return self._loop.active(self._solution)
+        return self._held_back.named()
 
 
 @final
@@ -132,10 +115,10 @@ class Loop:
         placed: Mapping[str, Any] | None = None,
         roles: Mapping[str, str | None] | None = None,
     ) -> None:
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise SpecError(f"dt: expected a positive number of seconds, got {dt}")
+        self.dt, self.t = number(dt, "dt", "a finite positive time in seconds", above=0.0), 0.0
+        if isinstance(state, State) and list(state.model.names) != list(robot.model.names):
+            raise SpecError(f"state: one of '{state.model.name}', expected one of '{robot.name}'")
         start = State(robot.model, state.q if isinstance(state, State) else state)
-        self.dt, self.t, self.count = float(dt), 0.0, 0
         self.compiled: CompiledPhase = compile_phase(robot, phase, start.q, placed, roles)
         self.stack = Stack(self.compiled, self.dt)
         self.q: Array = np.array(start.q)
@@ -143,40 +126,45 @@ class Loop:
         self.stack.measure(self.q)
         self._backend = make_backend(backend, self.stack)
         self._retraction = Retraction(self.stack)
-        self._check_driven_speed()
-
-    def _check_driven_speed(self) -> None:
-        """A joint whose motion is given must not be asked to be faster than its limit."""
-        names, speed = self.compiled.robot.joint_names, self.compiled.model.velocityLimit[6:]
-        times = np.linspace(0.0, self.compiled.phase.duration, 201)
-        for d in self.compiled.driven:
-            if d.path.constant or d.path.live:
-                continue
-            rates = np.abs(np.diff([float(d.path.at(t)) for t in times])) / (times[1] - times[0])
-            if rates.max() > speed[d.joint]:
-                need = self.compiled.phase.duration * rates.max() / speed[d.joint]
-                raise SpecError(
-                    f"phase '{self.compiled.phase.name}': joint '{names[d.joint]}' would have to move at "
-                    f"{rates.max():.3g}, its limit is {speed[d.joint]:.3g}; give the phase {need:.2g} s or more"
-                )
 
     @property
     def margin(self) -> float:
         """Stability margin now [m]."""
         return self.stack.margin
 
+    def targets(self) -> dict[str, Array]:
+        """Pose (7,) x y z qx qy qz qw in the world that each task on a frame asks for now, by task.
+
+        A point that is asked for has the world's orientation; tasks in another root are left out.
+        """
+        found = {}
+        for target in self.compiled.frame_targets:
+            if target.root != WORLD or target.label.startswith("contact("):
+                continue
+            value = target.path.at(self.t)
+            if not isinstance(value, pin.SE3):
+                if np.shape(value) != (3,):
+                    continue
+                value = pin.SE3(np.eye(3), np.asarray(value))
+            found[target.label] = pin.SE3ToXYZQUAT(value)
+        return found
+
+    def bodies(self) -> dict[str, Array]:
+        """Pose (7,) x y z qx qy qz qw in the world of each carried body now, by name."""
+        places = self.stack.kinematics.data.oMf
+        return {h.body.name: pin.SE3ToXYZQUAT(places[h.frame]) for h in self.compiled.held}
+
     def step(self, t: float | None = None) -> Tick:
         """Move on by one tick, from time `t` [s] of the phase (by default where the last one ended).
 
         Raises:
             SolveError: no step keeps every hard row and limit. The loop's state is unchanged.
+            SpecError: a path's value is not finite, or not of its kind. The loop's state is unchanged.
         """
         started = time.perf_counter()
         stack, q = self.stack, self.q
         if t is not None and t != self.t:
-            if not np.isfinite(t):
-                raise SpecError(f"Loop.step: expected a finite time in seconds, got {t}")
-            self.t = float(t)
+            self.t = number(t, "Loop.step: t", "a finite time in seconds")
             stack.aim(self.t)
             stack.measure(q)
         elif stack.live:
@@ -184,19 +172,17 @@ class Loop:
             stack.measure(q)
         before = stack.margin
         ends = self.t + self.dt
-        stack.advance(self.t)
         try:
+            stack.advance(self.t)
             solution = self._backend.solve()
             new = self._keep(q, solution.step, before)
-        except SolveError:
+        except WbplanError:
             stack.aim(self.t)
             stack.measure(q)
             raise
-        v = pin.difference(self.compiled.model, q, new) / self.dt
         self.q, self.t = new, ends
-        self.count += 1
-        com = stack.kinematics.com.copy()
-        return Tick(self, ends, new, v, com, stack.margin, solution, time.perf_counter() - started)
+        v = pin.difference(self.compiled.model, q, new) / self.dt
+        return Tick(self, v, HeldBack(stack, solution), started)
 
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""
@@ -215,8 +201,8 @@ class Loop:
             raise self._off(q, *stack.hard_names()[worst], abs(float(stack.hard_error[worst])))
         if not self._margin_kept(before):
             raise SolveError(
-                f"phase '{self.compiled.phase.name}': the step leaves a stability margin of {stack.margin:.5f} m, "
-                f"{self.compiled.margin} m is promised; move slower or use a smaller dt"
+                f"phase '{self.compiled.phase.name}': the step leaves a stability margin of "
+                f"{stack.margin:.5f} m, {self.compiled.margin} m is promised; move slower or use a smaller dt"
             )
         return new
 
@@ -241,47 +227,3 @@ class Loop:
         if promised is None:
             return True
         return self.stack.margin >= min(promised, before) - 1e-9
-
-    def active(self, solution: Solution) -> tuple[Active, ...]:
-        """What held the robot back in a step; see `Tick.active`."""
-        stack = self.stack
-        pull = max(float(np.abs(stack.g).max(initial=0.0)), 1e-12)
-        found: list[Active] = []
-        if solution.multipliers is not None:
-            m = solution.multipliers()
-            for k in np.flatnonzero(np.abs(m.box) > FAINT * pull):
-                found.append(self._bound(int(k), float(m.box[k]), pull))
-            for k in np.flatnonzero(np.abs(m.edges) > FAINT * pull):
-                found.append(Active(stack.edge_names()[k], "margin", float(abs(m.edges[k]) / pull)))
-            hard: dict[str, float] = {}
-            for (label, _), y in zip(stack.hard_names(), m.hard, strict=True):
-                hard[label] = max(hard.get(label, 0.0), abs(float(y)) / pull)
-            found += [Active(label, "hard", y) for label, y in hard.items() if y > FAINT]
-        else:
-            found = self._active_by_touch(solution)
-        return tuple(sorted(found, key=lambda a: -np.nan_to_num(a.multiplier)))
-
-    def _bound(self, column: int, multiplier: float, pull: float) -> Active:
-        lower, upper = self.stack.box_names()[column]
-        up = multiplier > 0
-        reach = self.stack.reach(column)
-        bound = self.stack.upper[column] if up else -self.stack.lower[column]
-        kind = "speed" if bound >= reach * (1 - 1e-9) else "position"
-        return Active(upper if up else lower, kind, abs(multiplier) / pull)
-
-    def _active_by_touch(self, solution: Solution) -> list[Active]:
-        """Bounds that the step touches: where the solver gives no multipliers."""
-        stack, x = self.stack, solution.step[self.compiled.free]
-        found = []
-        for k in range(6, len(x)):
-            for up, gap in ((True, stack.upper[k] - x[k]), (False, x[k] - stack.lower[k])):
-                if gap < 1e-9:
-                    name = stack.box_names()[k][int(up)]
-                    bound = stack.upper[k] if up else -stack.lower[k]
-                    kind = "speed" if bound >= stack.reach(k) * (1 - 1e-9) else "position"
-                    found.append(Active(name, kind, float("nan")))
-        promised, polygon = self.compiled.margin, self.compiled.polygon
-        if polygon is not None and promised is not None:
-            room = polygon.offsets - polygon.normals @ stack.kinematics.com[:2] - promised
-            found += [Active(stack.edge_names()[k], "margin", float("nan")) for k in np.flatnonzero(room < 2e-4)]
-        return found

@@ -84,10 +84,9 @@ def test_a_start_outside_joint_limits_names_the_joints(legarm: wb.Robot) -> None
     ("start", "says"),
     [
         ("sit", r"no pose 'sit'; poses: .*stand"),
-        (None, "q of robot 'legarm_hexapod'"),
         (np.zeros(3), r"q of robot 'legarm_hexapod': shape \(3,\), expected"),
     ],
-    ids=["unknown pose", "none", "too short"],
+    ids=["unknown pose", "too short"],
 )
 def test_a_start_that_is_none_is_refused(legarm: wb.Robot, start: Any, says: str) -> None:
     with pytest.raises(wb.SpecError, match=says):
@@ -171,3 +170,13 @@ def test_an_unreachable_soft_target_is_no_error(legarm: wb.Robot) -> None:
     )
     assert plan.check().ok
     assert plan.report["worst"]["position(limb1_tip).position"] > 4.0
+
+
+def test_a_script_may_say_where_it_starts(legarm: wb.Robot) -> None:
+    folded = wb.Phase("stand", contacts=[wb.Contact(foot) for foot in legarm.feet.values()], duration=0.02)
+    script = wb.Script(folded, start="folded")
+    np.testing.assert_array_equal(wb.plan(legarm, script).trajectory.q[0], legarm.state("folded").q)
+    told = wb.plan(legarm, script, start="stand")
+    np.testing.assert_array_equal(told.trajectory.q[0], legarm.state("stand").q)
+    with pytest.raises(wb.SpecError, match=r"Script\.start: expected a State or the name of a pose"):
+        wb.Script(folded, start=3.0)  # type: ignore[arg-type]

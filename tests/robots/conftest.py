@@ -15,6 +15,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbplan as wb
+
 URDF = Path(__file__).resolve().parents[2] / "urdf"
 
 
@@ -47,6 +49,11 @@ class Machine:
     @cached_property
     def solids(self) -> pin.GeometryModel:
         return pin.buildGeomFromUrdf(self.model, str(self.urdf), pin.GeometryType.COLLISION)
+
+    @cached_property
+    def robot(self) -> wb.Robot:
+        """As the planner sees it."""
+        return wb.load_robot(self.name)
 
     def states(self, group: str) -> dict[str, dict[str, float]]:
         """Group states: name -> joint -> value."""
@@ -99,13 +106,60 @@ class Machine:
             if result.isCollision()
         }
 
+    @cached_property
+    def checked(self) -> pin.GeometryModel:
+        """Collision shapes with the pairs of links that a planner would check."""
+        return self.solids_with(set(self.disabled()), keep=False)
+
     def link_of(self, geometry: pin.GeometryObject) -> str:
         return str(self.model.frames[geometry.parentFrame].name)
 
 
+MACHINES = {path.parent.name: Machine(path.parent.name) for path in sorted(URDF.glob("*/generate.py"))}
+
+
+@pytest.fixture(scope="session", params=MACHINES.values(), ids=MACHINES.keys())
+def machine(request) -> Machine:
+    """Each robot of the repository."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def machines() -> dict[str, Machine]:
+    """The same by name."""
+    return MACHINES
+
+
 @pytest.fixture(scope="session")
 def legarm() -> Machine:
-    return Machine("legarm_hexapod")
+    return MACHINES["legarm_hexapod"]
+
+
+@pytest.fixture(scope="session")
+def sway() -> Callable[..., wb.Plan]:
+    """Plans how a robot's body moves out and back while all its feet stay."""
+
+    def plan(robot: wb.Robot, pose: str, shift, turn, margin: float = 0.02) -> wb.Plan:
+        start = robot.state(pose)
+        body = next(frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY)
+        here = start.pose(body)
+        there = pin.SE3(here.rotation @ pin.exp3(np.array(turn)), here.translation + np.array(shift))
+        phase = wb.Phase(
+            "sway",
+            contacts=[wb.Contact(foot, friction=0.6) for foot in robot.standing_feet(start.q)],
+            soft=[
+                wb.PoseTask(
+                    body, wb.Waypoints((0.0, 0.6, 1.2), [wb.AS_IS, there, here]), weight=(20.0, 10.0)
+                ),
+                wb.PostureTask(weight=0.01),
+                wb.DampingTask(),
+            ],
+            limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+            duration=1.2,
+        )
+        return wb.plan(robot, phase, start=start, dt=0.02)
+
+    return plan
 
 
 @pytest.fixture(scope="session")

@@ -273,6 +273,19 @@ def test_two_different_bodies_do_not_share_a_name(other: wb.Body) -> None:
         wb.Script(phase, wb.Phase("b", carried=[wb.Carried(other, by="tip")]))
 
 
+@pytest.mark.parametrize(
+    "other",
+    [
+        wb.Body("box", mass=0.9, pose=POSE),
+        wb.Body("box", mass=0.8, pose=pin.SE3(np.eye(3), np.array([0.0, 0.0, 1e-6]))),
+    ],
+    ids=["mass", "place"],
+)
+def test_two_bodies_that_stand_somewhere_are_alike_in_all_or_different(other: wb.Body) -> None:
+    with pytest.raises(wb.SpecError, match="Script: two different bodies are named 'box'"):
+        wb.Script(wb.Phase("a"), bodies=[wb.Body("box", mass=0.8, pose=POSE), other])
+
+
 def test_the_same_body_is_known_once() -> None:
     place = wb.Body("box", mass=0.8, pose=POSE)
     again = wb.Body("box", mass=0.8, pose=POSE)

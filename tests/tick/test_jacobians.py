@@ -21,20 +21,26 @@ def random_state(robot: wb.Robot, rng: np.random.Generator) -> np.ndarray:
     q = np.array(robot.state("stand").q)
     low, high = robot.model.lowerPositionLimit[7:], robot.model.upperPositionLimit[7:]
     q[7:] = low + (high - low) * rng.uniform(0.1, 0.9, size=len(low))
-    return pin.integrate(robot.model, q, np.concatenate([0.3 * rng.normal(size=6), np.zeros(robot.model.nv - 6)]))
+    return pin.integrate(
+        robot.model, q, np.concatenate([0.3 * rng.normal(size=6), np.zeros(robot.model.nv - 6)])
+    )
 
 
 TASKS = {
     "pose": lambda rng: wb.PoseTask("limb1_tip", random_pose(rng)),
     "pose, some axes": lambda rng: wb.PoseTask("limb2_tip", random_pose(rng), weight=((1, 0, 2), (0, 3, 1))),
-    "pose, one axis each": lambda rng: wb.PoseTask("leg5_foot", random_pose(rng), weight=((0, 1, 0), (0, 0, 1))),
+    "pose, one axis each": lambda rng: wb.PoseTask(
+        "leg5_foot", random_pose(rng), weight=((0, 1, 0), (0, 0, 1))
+    ),
     "position": lambda rng: wb.PositionTask("leg3_foot", rng.normal(size=3)),
     "orientation": lambda rng: wb.OrientationTask("body", random_pose(rng)),
     "relative pose": lambda rng: wb.RelativePoseTask("limb2_tip", root="limb1_tip", target=random_pose(rng)),
     "relative, some axes": lambda rng: wb.RelativePoseTask(
         "leg4_foot", root="limb1_tip", target=random_pose(rng), weight=((1, 0, 0), (0, 1, 1))
     ),
-    "relative to the body": lambda rng: wb.RelativePoseTask("limb2_tip", root="body", target=random_pose(rng)),
+    "relative to the body": lambda rng: wb.RelativePoseTask(
+        "limb2_tip", root="body", target=random_pose(rng)
+    ),
     "com": lambda rng: wb.ComTask(rng.normal(size=3)),
     "com, horizontal": lambda rng: wb.ComTask(rng.normal(size=3), weight=(1, 1, 0)),
     "carried body": lambda rng: wb.PoseTask("box", random_pose(rng)),
@@ -95,7 +101,9 @@ def test_support_polygon_rows_are_the_derivative_of_the_distance_to_each_edge(le
 
 
 def test_poses_read_through_kept_views_follow_every_update(legarm: wb.Robot) -> None:
-    stack = stack_with(legarm, wb.PoseTask("limb1_tip", pin.SE3.Identity()), np.array(legarm.state("stand").q))
+    stack = stack_with(
+        legarm, wb.PoseTask("limb1_tip", pin.SE3.Identity()), np.array(legarm.state("stand").q)
+    )
     rng = np.random.default_rng(3)
     for _ in range(3):
         q = random_state(legarm, rng)

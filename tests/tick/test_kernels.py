@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import wbplan as wb
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.kernels import log_derivative, rotation_log
+from wbplan.qp import Multipliers
 from wbplan.sampling import sample
 from wbplan.stack import Stack
 
@@ -53,7 +54,9 @@ PATHS = {
     "line": wb.Line(pose(0, 1, 0, 0.2, 0, 0), pose(1, 0, 0, 0, 0.4, 0), 2.0),
     "swing": wb.Swing(np.zeros(3), np.array([0.2, 0.1, 0.0]), 0.05, 0.8),
     "swing of poses": wb.Swing(pose(0, 0, 0, 0, 0, 0), pose(0.1, 0, 0, 0, 0, 0.5), 0.05, 0.8),
-    "waypoints": wb.Waypoints((0, 1, 2), (pose(0, 0, 0, 0, 0, 0), pose(1, 0, 0, 0, 1, 0), pose(0, 1, 0, 2, 0, 0))),
+    "waypoints": wb.Waypoints(
+        (0, 1, 2), (pose(0, 0, 0, 0, 0, 0), pose(1, 0, 0, 0, 1, 0), pose(0, 1, 0, 2, 0, 0))
+    ),
     "waypoints of points": wb.Waypoints((0, 1, 2), (np.zeros(3), np.ones(3), np.array([0.0, 1.0, -1.0]))),
     "waypoints of rotations": wb.Waypoints((0, 1), (np.eye(3), pin.exp3(np.array([0.0, 0.5, 0.0])))),
     "hold": wb.Hold(pose(1, 2, 3, 0.1, 0.2, 0.3)),
@@ -80,7 +83,9 @@ def clamp_like(robot: wb.Robot) -> wb.Phase:
     """Loop, polygon and targets that run into joint limits and out again."""
     start = robot.state("manipulate")
     out = start.pose("body").translation + np.array([0.06, 0.1, -0.08])
-    tour = wb.Waypoints((0.0, 1.0, 2.0), (wb.AS_IS, pin.SE3(pin.exp3(np.array([0.2, 0.0, 0.3])), out), wb.AS_IS))
+    tour = wb.Waypoints(
+        (0.0, 1.0, 2.0), (wb.AS_IS, pin.SE3(pin.exp3(np.array([0.2, 0.0, 0.3])), out), wb.AS_IS)
+    )
     return wb.Phase(
         "tour",
         contacts=[wb.Contact(f"leg{i}_foot") for i in (3, 4, 5, 6)],
@@ -95,9 +100,7 @@ def asked_of_proxqp(stack: Stack) -> proxsuite.proxqp.Results:
     n, m, e = len(stack.g), len(stack.b), len(stack.d)
     qp = proxsuite.proxqp.dense.QP(n, m, e, True)
     qp.settings.eps_abs, qp.settings.eps_rel = 1e-11, 0.0
-    qp.init(
-        stack.H, stack.g, stack.A, stack.b, stack.C, np.full(e, -1e20), stack.d, stack.lower, stack.upper
-    )
+    qp.init(stack.H, stack.g, stack.A, stack.b, stack.C, np.full(e, -1e20), stack.d, stack.lower, stack.upper)
     qp.solve()
     return qp.results
 
@@ -108,18 +111,19 @@ def test_the_linear_solve_finds_the_solvers_step_and_multipliers(
     found_active, hits = 0, []
     solve = ActiveSetGuess.solve
 
-    def compared(self: ActiveSetGuess) -> np.ndarray | None:
+    def compared(self: ActiveSetGuess) -> tuple[np.ndarray, Multipliers] | None:
         nonlocal found_active
-        x = solve(self)
-        hits.append(x is not None)
-        if x is not None:
+        found = solve(self)
+        hits.append(found is not None)
+        if found is not None:
+            x, multipliers = found
             results, edges = asked_of_proxqp(self._stack), len(self._stack.d)
             np.testing.assert_allclose(x, results.x, atol=2e-7)
             scale = np.abs(results.z).max(initial=0.0) + 1e-3
-            np.testing.assert_allclose(self.multipliers.edges, results.z[:edges], atol=1e-5 * scale)
-            np.testing.assert_allclose(self.multipliers.box, results.z[edges:], atol=1e-5 * scale)
-            found_active += int((np.abs(self.multipliers.box) > 1e-6).any())
-        return x
+            np.testing.assert_allclose(multipliers.edges, results.z[:edges], atol=1e-5 * scale)
+            np.testing.assert_allclose(multipliers.box, results.z[edges:], atol=1e-5 * scale)
+            found_active += int((np.abs(multipliers.box) > 1e-6).any())
+        return found
 
     monkeypatch.setattr(ActiveSetGuess, "solve", compared)
     loop = wb.Loop(legarm, clamp_like(legarm), legarm.state("manipulate"), dt=0.01)

@@ -84,18 +84,32 @@ def poses() -> dict[str, dict[str, float]]:
     }
 
 
-def unchecked(joints: list[Joint]) -> list[tuple[str, str, str]]:
-    """Link pairs that need no collision check, with the reason."""
-    pairs = [(j.parent, j.child, "Adjacent") for j in joints if j.kind != "fixed"]
-    return pairs + never()
+LINKS = ("coxa", "thigh", "shin")
+MIRROR = (("leg1", "leg6"), ("leg3", "leg4"))  # neighbours on either side of the y axis
+BESIDE = (("leg1", "leg3"), ("leg4", "leg6"))  # on one side of it, with leg 2 or leg 5 between
 
 
-def never() -> list[tuple[str, str, str]]:
-    """Pairs that the joints' ranges keep apart; a test samples them again."""
+def never() -> list[tuple[str, str]]:
+    """Pairs that the joints' ranges keep apart, found by sampling; a test samples them again."""
     pairs = []
     for one, other in combinations(LEGS, 2):
-        pairs.append((f"{one}_coxa", f"{other}_coxa", "Never"))
+        steps = (LEGS.index(other) - LEGS.index(one)) % 6
+        near = (one, other) in (*MIRROR, *BESIDE)
+        for a in LINKS:
+            for b in LINKS:
+                coxae = (a == "coxa") + (b == "coxa")
+                shins = (a == "shin") + (b == "shin")
+                apart = {3: True, 2: shins < 2, 4: shins < 2}.get(steps, coxae == 2)
+                if (coxae > 0 if near else apart) or ((one, other) in MIRROR and a == b == "thigh"):
+                    pairs.append((f"{one}_{a}", f"{other}_{b}"))
     return pairs
+
+
+def unchecked(joints: list[Joint]) -> list[tuple[str, str, str]]:
+    """Link pairs that need no collision check, with the reason."""
+    frames = {f"{leg}_foot" for leg in LEGS}
+    adjacent = [(j.parent, j.child, "Adjacent") for j in joints if j.child not in frames]
+    return [*adjacent, *((one, other, "Never") for one, other in never())]
 
 
 def generate() -> dict[str, str]:

@@ -64,7 +64,7 @@ def poses() -> dict[str, dict[str, float]]:
 def unchecked(joints: list[Joint]) -> list[tuple[str, str, str]]:
     """Link pairs that need no collision check, with the reason."""
     pairs = [(j.parent, j.child, "Adjacent") for j in joints if j.kind == "revolute"]
-    # Kept apart by the joints' ranges: sampled with their ends, at least 22 mm from the thorax and 55 mm
+    # Kept apart by the joints' ranges: sampled with their ends, at least 22 mm from the thorax and 48 mm
     # between legs; a test samples them again.
     pairs += [("thorax", f"{name}_femur", "Never") for name in CORNERS]
     for (i, one), (k, other) in combinations(enumerate(LEGS), 2):

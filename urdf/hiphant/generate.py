@@ -10,6 +10,7 @@ a leg back and the arm down.
 from __future__ import annotations
 
 import sys
+from itertools import combinations
 from math import radians
 from pathlib import Path
 
@@ -98,11 +99,30 @@ def poses() -> dict[str, dict[str, float]]:
     }
 
 
+ACROSS = (("rf", "lf"), ("rr", "lr"))  # neighbours whose knees can meet below the torso
+REAR = ("rr", "lr")
+
+
+def never() -> list[tuple[str, str]]:
+    """Pairs that the joints' ranges keep apart, found by sampling; a test samples them again."""
+    pairs = [(f"{leg}_hip", f"{leg}_shank") for leg in LEGS]  # the shank turns in a plane of its own
+    for one, other in combinations(LEGS, 2):
+        pairs += [(f"{one}_hip", f"{other}_{link}") for link in ("hip", "thigh", "shank")]
+        pairs += [(f"{one}_{link}", f"{other}_hip") for link in ("thigh", "shank")]
+        if (one, other) not in ACROSS:
+            pairs.append((f"{one}_thigh", f"{other}_thigh"))
+    pairs += [(f"{leg}_hip", link) for leg in LEGS for link in ("arm_base", "arm_link1")]
+    pairs += [(f"{leg}_thigh", link) for leg in REAR for link in ("arm_base", "arm_link1")]
+    pairs += [(f"{leg}_hip", link) for leg in REAR for link in ("arm_link2", "arm_link3")]
+    pairs += [("body", "arm_link1"), ("arm_link1", "arm_link3")]
+    return [*pairs, ("arm_link3", "arm_link5"), ("arm_link3", "arm_link6")]
+
+
 def unchecked(joints: list[Joint]) -> list[tuple[str, str, str]]:
     """Link pairs that need no collision check, with the reason."""
     frames = {"arm_tip", *(f"{leg}_foot" for leg in LEGS)}
-    pairs = [(j.parent, j.child, "Adjacent") for j in joints if j.child not in frames]
-    return pairs
+    adjacent = [(j.parent, j.child, "Adjacent") for j in joints if j.child not in frames]
+    return [*adjacent, *((one, other, "Never") for one, other in never())]
 
 
 def generate() -> dict[str, str]:

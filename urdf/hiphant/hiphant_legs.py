@@ -11,7 +11,7 @@ from writer import Link
 
 HULL = 0.110  # half width of the hull between the hips
 DECK = 0.08  # its top above {B}, where the arm is bolted on
-WING = 0.215  # half length of the wide middle
+WING = 0.190  # half length of the wide middle
 DRIVE_Y = 0.115  # axis of the abduction modules, half in the hull: a belt takes them to the joint
 BELT = (0.070, 0.088)  # where the belt runs, along x towards the middle from the hip
 
@@ -36,7 +36,7 @@ def body() -> Link:
     long, wide = T.torso_length / 2, T.torso_width / 2
     parts = [
         block((-long + 0.02, -HULL, -0.055), (long - 0.02, HULL, DECK - 0.012), "dark_aluminium"),
-        block((-WING, -wide, -0.030), (WING, wide, DECK - 0.012), "shell_white"),
+        block((-WING, -wide, -0.010), (WING, wide, DECK - 0.012), "shell_white"),
         block((-long + 0.05, -HULL - 0.004, DECK - 0.012), (long - 0.05, HULL + 0.004, DECK), "shell_white"),
         block((long - 0.02, -HULL + 0.01, -0.045), (long, HULL - 0.01, DECK - 0.02), "shell_white"),
         block((-long, -HULL + 0.01, -0.045), (-long + 0.02, HULL - 0.01, DECK - 0.02), "shell_white"),
@@ -47,24 +47,25 @@ def body() -> Link:
     parts += sensors(long)
     covers = (
         block((-long, -HULL, -0.055), (long, HULL, DECK)),
-        block((-WING, -wide, -0.030), (WING, wide, DECK)),
+        block((-WING, -wide, -0.010), (WING, wide, DECK)),
         Part(box(0.10, 0.09, 0.12), (-0.33, 0.0, DECK + 0.06)),
         *(
             block((x - 0.0515, y - 0.050, -0.050), (x + 0.0515, y + 0.050, 0.050))
             for x in (-0.2785, 0.2785)
             for y in (-DRIVE_Y, DRIVE_Y)
         ),
-        *(belt(leg) for leg in LEGS),
+        *(part for leg in LEGS for part in belt(leg)),
     )
     return Link("body", tuple(parts), T.torso - 4 * T.module, covers)
 
 
-def belt(leg: str) -> Part:
-    """The belt's case, from the module to the abduction joint."""
+def belt(leg: str) -> Iterator[Part]:
+    """The belt's case, from the module to the abduction joint; slim there, since the thigh swings past."""
     x, y = FRONT[leg] * T.hip_x, LEFT[leg] * T.hip_y
     a, b = sorted(x - FRONT[leg] * near for near in BELT)
-    low, high = sorted((LEFT[leg] * 0.080, y + LEFT[leg] * 0.014))
-    return block((a, low, -0.034), (b, high, 0.034), "aluminium")
+    for start, end, high in ((0.080, 0.170, 0.034), (0.170, abs(y) + 0.010, 0.016)):
+        low, top = sorted((LEFT[leg] * start, LEFT[leg] * end))
+        yield block((a, low, -high), (b, top, high), "aluminium")
 
 
 def abduction(leg: str) -> Iterator[Part]:
@@ -72,22 +73,22 @@ def abduction(leg: str) -> Iterator[Part]:
     x, y = FRONT[leg] * T.hip_x, LEFT[leg] * T.hip_y
     inner, outer, end = (x - FRONT[leg] * far for far in (BELT[1] + T.module_length, BELT[1], BELT[1] + 0.03))
     yield from module((inner, LEFT[leg] * DRIVE_Y, 0.0), (outer, LEFT[leg] * DRIVE_Y, 0.0), T.module)
-    yield belt(leg)
-    yield rod((end, y, 0.0), (outer, y, 0.0), 0.014, "dark_aluminium")
+    yield from belt(leg)
+    yield rod((end, y, 0.0), (outer, y, 0.0), 0.010, "dark_aluminium")
     pulley = x - FRONT[leg] * (BELT[1] + 0.002)
-    yield rod((outer, y, 0.0), (pulley, y, 0.0), 0.0145, "accent_blue", mass=0.0)
+    yield rod((outer, y, 0.0), (pulley, y, 0.0), 0.0105, "accent_blue", mass=0.0)
 
 
 def wings(wide: float) -> Iterator[Part]:
     """Trim of the wide middle: battery doors, cooling slots, handles."""
     for side in (1.0, -1.0):
         low, high = sorted((side * wide, side * (wide + 0.003)))
-        yield block((-0.185, low, -0.015), (0.185, high, 0.052), "dark_aluminium", mass=0.0)
-        yield block((-0.185, low, 0.056), (0.185, high, 0.064), "accent_blue", mass=0.0)
+        yield block((-0.165, low, 0.0), (0.165, high, 0.052), "dark_aluminium", mass=0.0)
+        yield block((-0.165, low, 0.056), (0.165, high, 0.064), "accent_blue", mass=0.0)
         for k in range(6):
             x = -0.12 + 0.048 * k
             low, high = sorted((side * (wide + 0.003), side * (wide + 0.0045)))
-            yield block((x - 0.014, low, 0.004), (x + 0.014, high, 0.034), "sensor_black", mass=0.0)
+            yield block((x - 0.014, low, 0.010), (x + 0.014, high, 0.040), "sensor_black", mass=0.0)
         y = side * 0.205
         for x in (-0.11, 0.11):
             yield rod((x, y, 0.066), (x, y, 0.105), 0.007, "carbon", mass=0.0)
@@ -178,7 +179,7 @@ def shank(leg: str) -> Link:
     """
     side, foot = LEFT[leg], -T.shank
     lean = radians(T.crouch)  # the shank leans so much; its own "up" is turned by this
-    ball = (-T.balloon * sin(lean), 0.0, foot + T.balloon * cos(lean))
+    ball = (T.balloon * sin(lean), 0.0, foot + T.balloon * cos(lean))
     parts = [
         rod((0.0, side * (OUTER + 0.006), 0.0), (0.0, side * 0.020, 0.0), 0.040, "aluminium"),
         rod((0.0, side * 0.020, 0.0), (0.0, side * 0.026, 0.0), 0.030, "dark_aluminium"),

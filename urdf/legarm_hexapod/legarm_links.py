@@ -110,22 +110,26 @@ def shank(limb: str, structure: float) -> Link:
 
 
 def shank1(limb: str, structure: float) -> Link:
-    """A channel, open below, that takes the folded arm; servo 4 outside, shank 2's rail on its back."""
+    """A channel, open below, that takes the folded arm; servo 4 outside, shank 2's rail on its back.
+
+    Servo 4 holds arm 1 from the outer side alone: on the inner side, to which arm 2 turns, the channel ends
+    before it.
+    """
     side = SIDE[limb]
     outer, inner = side * 0.022, -side * 0.022
     plates = []
-    for face, end in ((outer, T.shank1 + 0.010), (inner, T.shank1)):
+    for face, end in ((outer, T.shank1 - 0.008), (inner, T.shank1 - 0.035)):
         low, high = sorted((face, face * (0.0245 / 0.022)))
         plates.append(block((-0.012, low, -0.014), (0.040, high, 0.014), solid=True))
-        plates.append(block((0.040, low, -0.014), (end - 0.018, high, 0.021), solid=True))
-        plates.append(block((end - 0.018, low, -0.010), (end, high, 0.010), solid=True))
+        plates.append(block((0.040, low, -0.014), (end, high, 0.021), solid=True))
+    low, high = sorted((outer, outer * (0.0245 / 0.022)))
+    plates.append(block((T.shank1 - 0.008, low, -0.010), (T.shank1 + 0.010, high, 0.010), solid=True))
     low, high = sorted((side * 0.0245, side * (0.0245 + DRS_0101.size[2])))
     servo = housing(DRS_0101, (T.shank1, (low + high) / 2, 0.0), "x", "y")
     parts = [
         *plates,
         block((0.040, -0.022, 0.0195), (0.125, 0.022, 0.0210), solid=True),
         Part(servo.shape, servo.xyz, material="servo_black", mass=DRS_0101.mass, solid=True),
-        rod((T.shank1, 0.0245 * -side, 0.0), (T.shank1, 0.0275 * -side, 0.0), 0.007, "servo_horn", mass=0.0),
         *(block((x, -0.008, 0.021), (x + 0.016, 0.008, 0.033), "blue", mass=0.0) for x in (0.056, 0.106)),
     ]
     return Link(f"{limb}_shank1", tuple(parts), structure)

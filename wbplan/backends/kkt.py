@@ -101,11 +101,7 @@ def _holds(
 
 @final
 class ActiveSetGuess:
-    """Tries the active bounds of the last solution; `learn` tells it those of a solver's.
-
-    Attributes:
-        multipliers: of the last solution that it gave.
-    """
+    """Tries the active bounds of the last solution; `learn` tells it those of a solver's."""
 
     def __init__(self, stack: Stack) -> None:
         n, m, e = len(stack.g), len(stack.b), len(stack.d)
@@ -114,25 +110,25 @@ class ActiveSetGuess:
         self._size = n + m
         most = 2 * n + m + e
         self._matrix, self._vector = np.zeros(most * most), np.zeros(most)
-        self.multipliers = Multipliers(np.zeros(m), np.zeros(e), np.zeros(n))
 
-    def solve(self) -> Array | None:
-        """The QP's solution (nf,), or None if it is not with these bounds."""
+    def solve(self) -> tuple[Array, Multipliers] | None:
+        """The QP's solution (nf,) and its multipliers, or None if it is not with these bounds."""
         s, size = self._stack, self._size
         K, rhs = self._matrix[: size * size].reshape(size, size), self._vector[:size]
         problem = (s.A, s.b, s.C, s.d, s.lower, s.upper, self._sides, self._edges)
         _fill(s.H, s.g, *problem, K, rhs)
         # K is symmetric: its transpose is the same matrix in LAPACK's order, taken without a copy.
         _, _, solved, info = lapack.dgesv(K.T, rhs, overwrite_a=True, overwrite_b=True)
-        m = self.multipliers
-        if info != 0 or not _holds(solved, *problem, m.box, m.edges, ROUNDING):
+        n, m = len(s.g), len(s.b)
+        box, edges = np.empty(n), np.empty(len(s.d))
+        if info != 0 or not _holds(solved, *problem, box, edges, ROUNDING):
             return None
-        n = len(s.g)
-        m.hard[:] = solved[n : n + len(s.b)]
-        return np.asarray(solved[:n])
+        return solved[:n].copy(), Multipliers(solved[n : n + m].copy(), edges, box)
 
     def learn(self, box: Array, edges: Array) -> None:
         """Take over the active bounds of a solver's multipliers, (nf,) and (E,)."""
         np.sign(np.where(np.abs(box) > ROUNDING, box, 0.0), out=self._sides, casting="unsafe")
         np.greater(edges, ROUNDING, out=self._edges)
-        self._size = len(self._stack.g) + len(self._stack.b) + int(np.abs(self._sides).sum() + self._edges.sum())
+        self._size = (
+            len(self._stack.g) + len(self._stack.b) + int(np.abs(self._sides).sum() + self._edges.sum())
+        )

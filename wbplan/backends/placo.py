@@ -7,8 +7,8 @@ it does not have is made up for here:
 - it has no gain, so a soft target is put where the gained step leads;
 - it has one weight a task, squared weights, and masks: a task of unequal weights becomes several;
 - its polygon must be clockwise, and one that is not is "infeasible" without a word;
-- hard rows that depend on each other make it throw. Those of such rows that are not contacts are given to it
-  as soft ones of a weight above all others, and the tick's own correction then puts them in full.
+- hard rows that depend on each other make it throw. Such rows, contacts last, are given to it as soft ones of
+  a weight above all others, and the tick's own correction then puts them in full.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, ComTarget, CompiledPhase, FrameTarget
+from wbplan.compiled import WORLD, CompiledPhase, ComTarget, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.qp import Solution
@@ -51,6 +51,7 @@ class PlacoBackend:
         if names != list(phase.robot.joint_names):
             raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
         self._soft_labels: set[str] = set()
+        self._patient = False
         self._widened: set[int] = set()
         self._build()
 
@@ -100,7 +101,9 @@ class PlacoBackend:
             if axes != "xyz":
                 task.mask.set_axises(axes, "task")
             part = "rotation" if rotation else "position"
-            task.configure(f"{target.label} {part} {axes}", *self._priority(target.label, target.hard, weight))
+            task.configure(
+                f"{target.label} {part} {axes}", *self._priority(target.label, target.hard, weight)
+            )
             tasks.append(task)
         return tasks
 
@@ -159,7 +162,9 @@ class PlacoBackend:
         solver.enable_joint_limits(limits is not None)
         solver.enable_velocity_limits(limits is not None)
         if limits is not None:
-            given = {driven.joint for driven in phase.driven}  # a given motion may use all of the URDF's speed
+            given = {
+                driven.joint for driven in phase.driven
+            }  # a given motion may use all of the URDF's speed
             for j, name in enumerate(phase.robot.joint_names):
                 share = 1.0 + 1e-6 if j in given else limits.speed
                 robot.set_velocity_limit(name, float(share * phase.model.velocityLimit[6 + j]))
@@ -171,7 +176,7 @@ class PlacoBackend:
             self._polygon.configure("support polygon", "hard", 1.0)
 
     def _admit_outsiders(self) -> None:
-        """A joint outside its limits may stay as far out as a tick at full speed leaves it, and no farther."""
+        """A joint outside its limits may stay as far out as a tick at full speed leaves it."""
         model, q, dt = self._stack.phase.model, self._stack.kinematics.q, self._stack.dt
         low, high = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
         outside = set(np.flatnonzero((q[7:] < low) | (q[7:] > high)).tolist())
@@ -189,24 +194,33 @@ class PlacoBackend:
         support = stack.phase.phase.support
         if support is None:
             return 0.0
-        wanted = support.margin + MARGIN_RESERVE
-        return min(wanted, stack.margin + support.recovery_speed * stack.dt)
+        inward = 0.0 if self._patient else support.recovery_speed * stack.dt
+        self._patient = False
+        return min(support.margin + MARGIN_RESERVE, stack.margin + inward)
 
     # -- each tick ---------------------------------------------------------------------------------------
 
     def solve(self) -> Solution:
         """See `Backend.solve`."""
-        try:
-            step = self._solve()
-        except RuntimeError:
-            self._soft_labels |= _dependent(self._stack)
-            self._build()
+        for mend in (self._soften, self._wait_for_margin):
             try:
-                step = self._solve()
-            except RuntimeError as error:
-                self._stack.assemble()
-                raise solve_error(self._stack, f"PlaCo finds no step ({_one_line(error)})") from None
-        return Solution(step)
+                return Solution(self._solve())
+            except RuntimeError:
+                mend()
+        try:
+            return Solution(self._solve())
+        except RuntimeError as error:
+            self._stack.assemble()
+            raise solve_error(self._stack, f"PlaCo finds no step ({_one_line(error)})") from None
+
+    def _soften(self) -> None:
+        """Hard rows may have come to depend on each other: tell PlaCo those as heavy soft ones."""
+        self._soft_labels |= _dependent(self._stack)
+        self._build()
+
+    def _wait_for_margin(self) -> None:
+        """Ask a CoM that is outside its margin only not to go further out."""
+        self._patient = True
 
     def _solve(self) -> Array:
         stack, robot = self._stack, self._robot
@@ -240,7 +254,7 @@ class PlacoBackend:
                     task.R_a_b = rotation
         for k, lag, task in self._coms:
             task.target_world = rows.com_goal[k] - lag * rows.com_error[k]
-        joints = stack.kinematics.q[stack.q_index] if self._postures else None
+        joints = stack.kinematics.q[stack.q_index]
         for task, names, columns, posture in self._postures:
             goals = posture.next_goal(joints)[columns].tolist()
             for name, goal in zip(names, goals, strict=True):
@@ -258,7 +272,6 @@ class PlacoBackend:
     def _sort_frame_tasks(self) -> None:
         """Put what never moves in its place for good; list the rest by what `_aim` has to do."""
         rows = self._stack.rows
-        still = lambda target: target.hard and target.path.constant  # noqa: E731
         self._moving_places: list[tuple[int, Any]] = []
         self._moving_relative_places: list[tuple[int, Any]] = []
         self._moving_turns: list[tuple[int, float, bool, list[Any]]] = []
@@ -266,14 +279,14 @@ class PlacoBackend:
             world = target.root == WORLD
             for task in self._frame_tasks(target, rotation=False):
                 setattr(task, "target_world" if world else "target", rows.position_goal[k].copy())
-                if not still(target):
+                if not _rests(target):
                     (self._moving_places if world else self._moving_relative_places).append((k, task))
         for k, target in enumerate(rows.rotation_targets):
             world = target.root == WORLD
             tasks = self._frame_tasks(target, rotation=True)
             for task in tasks:
                 setattr(task, "R_world_frame" if world else "R_a_b", rows.rotation_goal[k].copy())
-            if not still(target):
+            if not _rests(target):
                 self._moving_turns.append((k, self._lag(target), world, tasks))
         self._position_lag = np.array([[self._lag(t)] for t in rows.position_targets]).reshape(-1, 1)
 
@@ -282,8 +295,13 @@ class PlacoBackend:
         return 0.0 if target.hard else float(np.exp(-target.gain * self._stack.dt))
 
 
+def _rests(target: FrameTarget) -> bool:
+    """Whether PlaCo needs to be told a target only once."""
+    return target.hard and target.path.constant
+
+
 def _dependent(stack: Stack) -> set[str]:
-    """Labels of hard rows, contacts left out, that depend on the others at the current configuration."""
+    """Labels of hard rows that depend on each other as the robot stands; contacts only if no task does."""
     if stack.n_hard == 0:
         return set()
     stack.assemble()
@@ -292,13 +310,13 @@ def _dependent(stack: Stack) -> set[str]:
     share = np.abs(left[:, rank:]).max(axis=1, initial=0.0)
     names = stack.hard_names()
     found = {names[k][0] for k in np.flatnonzero(share > 1e-3)}
-    return {label for label in found if not label.startswith("contact(")}
+    return {label for label in found if not label.startswith("contact(")} or found
 
 
 def _urdf_with_carried(phase: CompiledPhase) -> str:
     """The URDF without its looks, and with each carried body as a link fixed to its holder."""
     root = etree.fromstring(phase.robot.urdf_text.encode(), etree.XMLParser(resolve_entities=False))
-    for element in [e for e in root.iter("visual", "collision")]:
+    for element in list(root.iter("visual", "collision")):
         element.getparent().remove(element)
     for held in phase.held:
         xyz = " ".join(repr(float(x)) for x in held.T_holder_body.translation)
