@@ -41,7 +41,6 @@ def good(machine: ModuleType) -> Bundle:
     return machine.build()
 
 
-
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """What the papers print beside what came out in this run, where their tests ran."""
     reports = [r for outcome in ("passed", "failed") for r in terminalreporter.stats.get(outcome, [])]

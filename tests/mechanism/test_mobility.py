@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from wbplan import Robot, SolveError, SpecError
-from wbplan.mechanism import Platform, actuated_sets, mobility, point_leg, positions, rank
+from wbplan.mechanism import Platform, actuated_sets, mobility, rank, stance_mobility
 from wbplan.papers import mana, zheng
 
 Standing = tuple[Platform, Mapping[str, float]]
@@ -21,12 +21,7 @@ def test_a_robot_on_its_feet_has_six_freedoms(robots: dict[str, Robot], name: st
     robot = robots[name]
     state = robot.state(pose)
     platform = Platform.of_robot(robot, state)
-    body = pin.XYZQUATToSE3(state.q[:7])
-    branches = []
-    for chain in platform.chains.values():
-        leg = point_leg(chain, positions(robot, chain.joints, state.q), body)
-        branches.append(np.vstack([leg.passive, leg.active]))
-    found = mobility(branches)
+    found = stance_mobility(platform, {j: state.joint(j) for j in platform.joints})
     assert found.mobility == found.grubler == found.platform == 6
     assert (found.common, found.redundant, found.virtual) == (0, 0, 0)
     # The same from the rank of Pinocchio's constraint Jacobian.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wbplan.papers import zheng
+from wbplan.papers import zheng, zheng_case
 
 from .conftest import Judge
 
@@ -27,9 +27,18 @@ def test_equations_2_to_7_mobility_of_the_clamp(judge: Judge) -> None:
     assert apart["with both"] > 0.05  # type: ignore[operator]
 
 
-def test_equations_22_to_31_inverse_kinematics(judge: Judge) -> None:
-    rows = judge(zheng.inverse_rows())
+def test_equations_23_to_29_inverse_kinematics(judge: Judge) -> None:
+    judge(zheng.inverse_rows())
+
+
+def test_equations_22_and_31_planar_part(judge: Judge) -> None:
+    rows = judge(zheng_case.equation_31())
     assert rows["share of its disc out of reach for a given thetax"].ours == pytest.approx(19.0, abs=1.0)
+
+
+def test_equations_26_and_27_case_1(judge: Judge) -> None:
+    rows = judge(zheng_case.equations_26_27())
+    assert rows["theta5 solved, arguments (y, x) only"].ours == 100
 
 
 def test_figure_16_stability_radii(judge: Judge) -> None:

@@ -8,7 +8,7 @@ from wbplan.mechanism.actuation import ActuatedSet, actuated_sets
 from wbplan.mechanism.forward import BodySolution, Follower, ForwardSolutions, forward
 from wbplan.mechanism.leg import ThreeJointLeg
 from wbplan.mechanism.limb5 import FiveJointLimb
-from wbplan.mechanism.mobility import ClampLoop, Mobility, mobility
+from wbplan.mechanism.mobility import ClampLoop, Mobility, mobility, stance_mobility
 from wbplan.mechanism.platform import Platform
 from wbplan.mechanism.poe import Chain, chain_to, limb_chain, positions
 from wbplan.mechanism.rates import (
@@ -63,6 +63,7 @@ __all__ = [
     "reciprocal",
     "skew",
     "slide",
+    "stance_mobility",
     "swap",
     "whole_body_jacobian",
     "wrench_matrix",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import null_space
 
 from wbplan.errors import SolveError, SpecError
+from wbplan.mechanism.platform import Platform
 from wbplan.mechanism.poe import Chain
+from wbplan.mechanism.rates import point_leg
 from wbplan.mechanism.screws import rank, reciprocal
 
 Array = NDArray[np.float64]
@@ -81,6 +83,21 @@ def mobility(branches: Sequence[ArrayLike]) -> Mobility:
         joints - rank(_loops(rows)),
         6 - independent,
     )
+
+
+def stance_mobility(platform: Platform, joints: Mapping[str, float]) -> Mobility:
+    """Mobility of the body on its legs: each a branch of its joints and three rotations at the foot.
+
+    Args:
+        platform: legs and feet.
+        joints: joint -> position [rad or m] of all stance joints, loops closed.
+
+    Raises:
+        SpecError: fewer than three legs, or a joint is missing.
+    """
+    body = platform.pose_of(joints)
+    legs = [point_leg(c, [joints[j] for j in c.joints], body) for c in platform.chains.values()]
+    return mobility([np.vstack([leg.passive, leg.active]) for leg in legs])
 
 
 def _loops(rows: Sequence[Array]) -> Array:

@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 from rich.table import Table
 
 from wbplan.errors import SpecError, listing
-from wbplan.papers import hexpiderix, hiphant, mana, mana_motion, zheng, zhuang
+from wbplan.papers import hexpiderix, hiphant, mana, mana_motion, zheng, zheng_case, zhuang
 from wbplan.papers.rows import DIFFERS, Row
 
 __all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
 
 PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES,
-    "zheng": zheng.TABLES,
+    "zheng": zheng.TABLES + zheng_case.TABLES,
     "hexpiderix": hexpiderix.TABLES,
     "hiphant": hiphant.TABLES,
     "zhuang": zhuang.TABLES,

@@ -207,7 +207,6 @@ def inverse_rows(count: int = 300) -> list[Row]:
             "",
             "root of the smaller |dl|",
         ),
-        *_reach_rows(arm),
     ]
 
 
@@ -261,32 +260,6 @@ def _case_one(arm: FiveJointLimb, count: int = 60) -> tuple[float, float]:
             for s in least.within
         )
     return plain / tried, pushed / tried
-
-
-def _reach_rows(arm: FiveJointLimb, count: int = 40000) -> list[Row]:
-    """Eq. 22's disc against what joints 2 to 4 can really reach for a given thetax."""
-    random = np.random.default_rng(4)
-    disc = arm.l2 + arm.l31 + arm.l4
-    radius, angle = disc * np.sqrt(random.uniform(size=count)), random.uniform(0, 2 * np.pi, count)
-    x = random.uniform(-np.pi, np.pi, count)
-    ta = radius * np.cos(angle) - arm.l4 * np.cos(x)
-    tb = radius * np.sin(angle) - arm.l4 * np.sin(x)
-    inside = (np.hypot(ta, tb) >= arm.reach[0]) & (np.hypot(ta, tb) <= arm.reach[1])
-    lost = 100.0 * float(1.0 - inside.mean())
-    return [
-        row(
-            "eq 22",
-            "share of its disc out of reach for a given thetax",
-            0.0,
-            lost,
-            0.5,
-            "%",
-            "only necessary: 80 <= S <= 320 mm",
-            True,
-        ),
-        row("eq 31", "least distance of joint 4 from joint 2", None, arm.reach[0] * 1e3, unit="mm"),
-        row("eq 31", "largest distance of joint 4 from joint 2", None, arm.reach[1] * 1e3, unit="mm"),
-    ]
 
 
 def figure_16() -> list[Row]:
