@@ -48,7 +48,7 @@ def equation_31(count: int = 300) -> list[Row]:
 def equations_26_27(count: int = 200) -> list[Row]:
     """Case 1: joint 5's angle for r33 = 1 and -1, the root for the shift, and the largest a."""
     arm, random = limb(), np.random.default_rng(7)
-    printed = unsigned = right = tried = far = near = 0
+    printed = unsigned = right = tried = far = 0
     excess = 0.0
     for k in range(count):
         q, down = random.uniform(arm.lower, arm.upper), 1.0 if k % 2 else -1.0
@@ -63,7 +63,6 @@ def equations_26_27(count: int = 200) -> list[Row]:
         c = random.uniform(0.0, b * b / 4.0)
         plus, minus = ((-b + sign * math.sqrt(b * b - 4.0 * c)) / 2.0 for sign in (1.0, -1.0))
         far += abs(plus) > abs(minus)
-        near += abs(minus) < abs(plus)
         depth = random.uniform(-0.25, 0.25)
         most = arm.l1 + math.sqrt((arm.l2 + arm.l31 + arm.l4) ** 2 - depth**2)
         x = random.uniform(0.0, math.pi)
@@ -91,7 +90,6 @@ def equations_26_27(count: int = 200) -> list[Row]:
             why="'+' is then the far one",
             misprint=True,
         ),
-        row("eq 27", "B < 0: root of the smaller |dl| is '-'", all_, float(near)),
         row(
             "eq 27",
             "reach beyond 320 mm at the printed largest a",
