@@ -176,6 +176,9 @@ def test_bad_input_is_named(standing: Standing, robots: dict[str, Robot]) -> Non
         forward(platform, {"leg1_ankle": 0.0}, near)
     with pytest.raises(SpecError, match="leave the body free to move"):
         forward(platform, {"leg1_knee": 0.5, "leg2_knee": 0.5}, near)
+    both = {n: home[n] for n in platform.joints if n.startswith(("leg1", "leg2"))}
+    with pytest.raises(SpecError, match="6 known joints leave the body free to move"):
+        forward(platform, both, near)
     with pytest.raises(SpecError, match="elimination needs one leg known whole"):
         forward(platform, {n: home[n] for n in names(OTHERS[0])}, near, method="elimination")
     with pytest.raises(SpecError, match="expected 'elimination' or 'multi-start'"):

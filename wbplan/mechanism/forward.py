@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from wbplan.errors import SolveError, SpecError, listing
 from wbplan.mechanism.elimination import eliminate
-from wbplan.mechanism.kernels import close_from_many, close_loops
+from wbplan.mechanism.kernels import close_from_many, close_loops, loop_equations
 from wbplan.mechanism.leg import ThreeJointLeg
 from wbplan.mechanism.platform import Platform
 from wbplan.mechanism.solutions import LimbSolution, wrapped
@@ -43,7 +43,8 @@ class BodySolution:
         pose: T_world_body.
         joints: joint -> position [rad or m], as far as they are determined: those of legs of which a joint is
             known, and of other legs where they reach their feet.
-        admissible: every leg reaches its foot within its joint limits.
+        admissible: every leg reaches its foot within its joint limits; legs without a closed form are not
+            judged.
         reason: why it is not admissible, or "".
         distance: from the given state [m]: |p - p'| and the angle between them times the size of the stance.
         hits: how many starts led there; 0 where it was found by elimination.
@@ -171,6 +172,24 @@ class Loops:
             q[self.place[name]] = value
         return q
 
+    def free(self, q: Array, rotation: Array, position: Array) -> bool:
+        """Whether the unknowns can move, at first order, with the loops closed."""
+        residual, jacobian = np.empty(3 * len(self.names)), np.empty((3 * len(self.names), 6 + self.passive))
+        loop_equations(
+            self.screws,
+            self.counts,
+            self.tips,
+            self.feet,
+            self.columns,
+            q,
+            rotation,
+            position,
+            residual,
+            jacobian,
+        )
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        return bool(values[-1] < 1e-7 * values[0])
+
 
 class Follower:
     """One branch of the forward displacement, followed along a path of the known joints.
@@ -273,7 +292,13 @@ def _multi_start(
         )  # fmt: skip
         starts += STARTS
         before = len(hits)
-        for s in np.flatnonzero(gaps < CLOSED):
+        closed = np.flatnonzero(gaps < CLOSED)
+        if not hits and len(closed) and all(loops.free(q[s], rotations[s], points[s]) for s in closed):
+            raise SpecError(
+                f"forward: the {len(known)} known joints leave the body free to move: at each of the {len(closed)} "
+                "poses found first the loop equations are dependent"
+            )
+        for s in closed:
             pose = pin.SE3(rotations[s], points[s])
             for k, (other, count) in enumerate(hits):
                 if distance_between(pose, other, size) < SAME:
