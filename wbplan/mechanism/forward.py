@@ -295,8 +295,8 @@ def _multi_start(
         closed = np.flatnonzero(gaps < CLOSED)
         if not hits and len(closed) and all(loops.free(q[s], rotations[s], points[s]) for s in closed):
             raise SpecError(
-                f"forward: the {len(known)} known joints leave the body free to move: at each of the {len(closed)} "
-                "poses found first the loop equations are dependent"
+                f"forward: the {len(known)} known joints leave the body free to move: at each of the "
+                f"{len(closed)} poses found first the loop equations are dependent"
             )
         for s in closed:
             pose = pin.SE3(rotations[s], points[s])
