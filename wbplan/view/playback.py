@@ -84,8 +84,8 @@ def play(
         ViewError: as `serve` does.
     """
     with serve(bundle, host, port, package_dirs=package_dirs) as server:
-        print(f"{_title(bundle)}: {server.url} (Ctrl-C ends it)", flush=True)
-        try:
+        try:  # from the moment that Ctrl-C is offered
+            print(f"{_title(bundle)}: {server.url} (Ctrl-C ends it)", flush=True)
             server.wait()
         except KeyboardInterrupt:
             return
