@@ -84,6 +84,10 @@ class ViewError(WbplanError):
     """The viewer cannot start or be reached."""
 
 
+class PhysicsError(WbplanError):
+    """A plan cannot be simulated."""
+
+
 def listing(names: Sequence[str], most: int = 12) -> str:
     """Names for a message: all where they are few, else the first ones and how many more there are."""
     shown = ", ".join(sorted(names)[:most]) or "none"
