@@ -87,7 +87,8 @@ class Motion:
 
     def sample(self, t: float) -> int:
         """The last sample not after `t` [s]."""
-        return int(np.clip(np.searchsorted(self.time, t + START, side="right") - 1, 0, len(self.time) - 1))
+        found = int(self.time.searchsorted(t + START, side="right")) - 1
+        return min(max(found, 0), len(self.time) - 1)
 
 
 def motion_of(bundle: Bundle, options: Options) -> Motion:

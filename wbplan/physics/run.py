@@ -18,6 +18,7 @@ from wbplan.physics.spec import FLOOR, OBJECT, ROBOT, STAND
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+GROUNDED = FLOOR | ROBOT
 LOADED = 0.5  #: a foot with at least this normal force [N] touches
 OVER = 1.2  #: a base tilted this much [rad] ends the replay: nothing is learnt from the rest
 
@@ -194,34 +195,39 @@ class _Run:
     def _log_contacts(self, k: int) -> None:
         data, contacts = self.data, self.data.contact
         first = contacts.efc_address
-        geoms = contacts.geom[first >= 0]
-        if not len(geoms):
+        felt = np.flatnonzero(first >= 0)
+        if not len(felt):
             return
-        rows = first[first >= 0]
-        normal = data.efc_force[rows]
-        tangent = np.hypot(data.efc_force[rows + 1], data.efc_force[rows + 2])
+        geoms, rows = contacts.geom[felt], first[felt]
+        force = data.efc_force
+        normal = force[rows]
         kinds = self.scene.kind[geoms]
         both = kinds[:, 0] | kinds[:, 1]
-        ground = both == (FLOOR | ROBOT)
-        if ground.any():
-            places, axes = contacts.pos[first >= 0], contacts.frame[first >= 0, :3]
-            for c in np.flatnonzero(ground):
-                own = int(geoms[c, 0] if kinds[c, 0] == ROBOT else geoms[c, 1])
-                foot = int(self.foot_of[own])
+        ground = np.flatnonzero(both == GROUNDED)
+        if len(ground):
+            own = np.where(kinds[ground, 0] == ROBOT, geoms[ground, 0], geoms[ground, 1])
+            feet, loads, at = self.foot_of[own], normal[ground], rows[ground]
+            sliding = self._sliding(own, contacts.pos[felt[ground]], contacts.frame[felt[ground], :3])
+            for c, foot in enumerate(feet):
                 if foot >= 0:
-                    self.normal[k, foot] += normal[c]
-                    self.tangent[k, foot] += tangent[c]
-                    if normal[c] > LOADED:
-                        self.slide[k, foot] = self._slide(own, places[c], axes[c])
-                elif normal[c] > LOADED:
+                    self.normal[k, foot] += loads[c]
+                    self.tangent[k, foot] += np.hypot(force[at[c] + 1], force[at[c] + 2])
+                    if loads[c] > LOADED:
+                        self.slide[k, foot] = sliding[c]
+                elif loads[c] > LOADED:
                     self.stray[k] = True
-                    self.strayed = self.strayed or self._link(own)
+                    self.strayed = self.strayed or self._link(own[c])
+        if len(ground) < len(felt):
+            self._log_touches(k, geoms, kinds, both, normal)
+
+    def _log_touches(self, k: int, geoms: Any, kinds: Any, both: Any, normal: Array) -> None:
+        """Contacts of links with each other, and of objects with anything."""
         for c in np.flatnonzero(both == ROBOT):
             if normal[c] > self.hardest:
                 self.hardest = float(normal[c])
                 self.clash = f"{self._link(geoms[c, 0])} - {self._link(geoms[c, 1])}"
             self.collision[k] = max(self.collision[k], normal[c])
-        for c in np.flatnonzero((both & OBJECT) > 0):
+        for c in np.flatnonzero(both & OBJECT):
             one, other = int(geoms[c, 0]), int(geoms[c, 1])
             if one not in self.object_of:
                 one, other = other, one
@@ -239,13 +245,14 @@ class _Run:
                 force = data.efc_force[rows]
                 self.normal[k, i], self.tangent[k, i] = force[2], np.hypot(force[0], force[1])
 
-    def _slide(self, geom: int, place: Array, axis: Array) -> Array:
-        """Velocity of the shape's material point at a contact, along the ground."""
-        body = self.model.geom_bodyid[geom]
-        twist = self.data.cvel[body]
-        arm = place - self.data.subtree_com[self.model.body_rootid[body]]
-        v = twist[3:] + np.cross(twist[:3], arm)
-        along: Array = v - axis * (axis @ v)
+    def _sliding(self, geoms: Any, places: Array, axes: Array) -> Array:
+        """(n, 3) velocity of shapes' material points at their contacts, along the ground."""
+        bodies = self.model.geom_bodyid[geoms]
+        twist = self.data.cvel[bodies]
+        x, y, z = (places - self.data.subtree_com[self.model.body_rootid[bodies]]).T
+        a, b, c = twist[:, :3].T
+        v = twist[:, 3:] + np.array([b * z - c * y, c * x - a * z, a * y - b * x]).T
+        along: Array = v - axes * (axes * v).sum(axis=1)[:, None]
         return along
 
     def _link(self, geom: Any) -> str:
