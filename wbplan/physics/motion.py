@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from wbplan.bundle import Bundle
 from wbplan.errors import PhysicsError
 from wbplan.physics.options import Options
+from wbplan.physics.statics import faded, holding_torques, pressing_torques
 
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81  # [m/s^2], as in Pinocchio
 START = 1e-9
+EVERY = 0.05  #: [s]
 
 
 @final
@@ -128,9 +130,7 @@ def motion_of(bundle: Bundle, options: Options) -> Motion:
             )
     joints = joint_values(model, record.q)
     squeeze = {span.name: _squeeze(bundle, span, friction, options) for span in spans}
-    offsets = np.zeros(joints.shape)
-    for span in spans:
-        offsets += _pressing(bundle, span, squeeze[span.name], time, options)
+    offsets = _offsets(bundle, spans, squeeze, options)
     return Motion(
         time=time, base=np.array(record.q[:, :7]), joints=joints, offsets=offsets,
         names=tuple(record.joint_names), feet=feet, places=places, touching=touching, friction=friction,
@@ -185,38 +185,65 @@ def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> f
         return 0.0
     if options.squeeze is not None:
         return options.squeeze
-    item = next(i for p in bundle.phases for i in p["carried"] if i["name"] == span.name)
     grip = grip_of(span, friction, options)
     if grip <= 0.0:
         return 0.0
-    return float(options.safety * item["mass"] * GRAVITY / (len(span.pads) * grip))
+    return float(options.safety * _mass(bundle, span) * GRAVITY / (len(span.pads) * grip))
 
 
-def _pressing(bundle: Bundle, span: Span, force: float, time: Array, options: Options) -> Array:
-    """(N, J) offsets by which the servos press each pad towards the middle of all: J^T f / kp.
+def _offsets(
+    bundle: Bundle, spans: tuple[Span, ...], squeeze: Mapping[str, float], options: Options
+) -> Array:
+    """(N, J) torque / kp: what the servos need to press the pads, and to hold the robot where it is planned.
 
-    The forces add up to nothing on the body where two pads face each other, so only joints take part.
+    Computed every `EVERY` seconds and at every change of phase, and joined by straight lines.
     """
-    model, q = bundle.model, bundle.trajectory.q
-    offsets = np.zeros((len(time), model.nv - 6))
-    if force == 0.0:
-        return offsets
-    share = np.interp(
-        time, [span.start - options.ramp, span.start, span.end, span.end + options.ramp], [0.0, 1.0, 1.0, 0.0]
-    )
-    share = share * share * (3.0 - 2.0 * share)
-    gains = _gains(model, options)
-    frames = [model.getFrameId(pad) for pad in span.pads]
-    data = model.createData()
-    for k in np.flatnonzero(share > 0.0):
-        pin.computeJointJacobians(model, data, q[k])
-        points = [np.array(pin.updateFramePlacement(model, data, frame).translation) for frame in frames]
-        middle = np.mean(points, axis=0)
-        for frame, point in zip(frames, points, strict=True):
-            inward = (middle - point) / max(float(np.linalg.norm(middle - point)), 1e-9)
-            J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3, 6:]
-            offsets[k] += share[k] * force * (J.T @ inward) / gains
+    model, record = bundle.model, bundle.trajectory
+    time = record.time - record.time[0]
+    kept = np.floor(time / EVERY + 1e-6)
+    edge = np.diff(record.phase, prepend=record.phase[:1]) != 0
+    chosen = np.flatnonzero((np.diff(kept, prepend=-1.0) > 0) | edge | np.append(edge[1:], True))
+    effort = np.asarray(model.effortLimit[6:], dtype=np.float64)
+    torques = np.zeros((len(chosen), len(effort)))
+    for row, k in enumerate(chosen):
+        phase = bundle.phases[int(record.phase[k])]
+        loads = [load for span in spans for load in _pad_loads(bundle, span, squeeze[span.name], k, options)]
+        feet = [model.getFrameId(c["frame"]) for c in phase["contacts"]]
+        friction = options.reserve * np.array([c["friction"] for c in phase["contacts"]])
+        if options.lead:
+            torques[row] = holding_torques(model, record.q[k], feet, friction, loads, effort)
+        else:
+            pressing = [(frame, force * [1.0, 1.0, 0.0]) for frame, force in loads]
+            torques[row] = pressing_torques(model, record.q[k], pressing)
+    full = np.column_stack([np.interp(time, time[chosen], column) for column in torques.T])
+    offsets: Array = faded(full, time) / _gains(model, options)
     return offsets
+
+
+def _pad_loads(bundle: Bundle, span: Span, force: float, k: int, options: Options) -> list[tuple[int, Array]]:
+    """Pads' frames, and what acts on the robot there: the object's weight, shared, and the squeeze."""
+    model, record = bundle.model, bundle.trajectory
+    t = float(record.time[k] - record.time[0])
+    knots = [span.start - options.ramp, span.start, span.end, span.end + options.ramp]
+    share = float(np.interp(t, knots, [0.0, 1.0, 1.0, 0.0]))
+    if share <= 0.0:
+        return []
+    data = model.createData()
+    pin.forwardKinematics(model, data, record.q[k])
+    frames = [model.getFrameId(pad) for pad in span.pads]
+    points = [np.array(pin.updateFramePlacement(model, data, frame).translation) for frame in frames]
+    middle = np.mean(points, axis=0)
+    weight = np.array([0.0, 0.0, -_mass(bundle, span) * GRAVITY / len(frames)])
+    loads = []
+    for frame, point in zip(frames, points, strict=True):
+        outward = (point - middle) / max(float(np.linalg.norm(point - middle)), 1e-9)
+        carried = weight if span.start <= t <= span.end else np.zeros(3)
+        loads.append((frame, share * share * (3.0 - 2.0 * share) * force * outward + carried))
+    return loads
+
+
+def _mass(bundle: Bundle, span: Span) -> float:
+    return next(float(i["mass"]) for p in bundle.phases for i in p["carried"] if i["name"] == span.name)
 
 
 def _gains(model: Any, options: Options) -> Array:

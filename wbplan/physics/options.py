@@ -66,6 +66,11 @@ class Options:
         feet: "ball": feet as the URDF shapes them, they roll and slip; "joint": a foot in contact is a ball
             joint at its frame.
         grip: friction of pads on objects; None takes the largest that the plan's contacts have.
+        patch: mean radius [m] of the patch in which a pad touches: its friction about its own normal, per
+            newton, is grip * patch.
+        lead: the servos' targets lead the plan by what a servo gives way under the plan's static load,
+            torque / kp; without it the robot sags.
+        reserve: share of the feet's friction that the static load may use.
         ground: friction of objects on the ground and on what they stand on.
         squeeze: force [N] with which each pad presses while something is carried; None takes `safety`
             times what friction needs to hold the weight.
@@ -81,6 +86,9 @@ class Options:
     servo: Servo = field(default_factory=Servo)
     feet: Feet = "ball"
     grip: float | None = None
+    patch: float = 0.01
+    lead: bool = True
+    reserve: float = 0.6
     ground: float = 0.5
     squeeze: float | None = None
     safety: float = 2.5
@@ -89,9 +97,9 @@ class Options:
     bounds: Bounds = field(default_factory=Bounds)
 
     def __post_init__(self) -> None:
-        _positive(self, "dt", "servo.error", "servo.travel", "servo.inertia", "safety", "ramp", "ground")
+        _positive(self, "dt", "servo.error", "servo.travel", "servo.inertia", "safety", "ramp", "ground", "reserve")
         _positive(self, *(f"bounds.{item.name}" for item in fields(Bounds)))
-        _positive(self, "settle", "rest", "servo.lag", "squeeze", "grip", zero=True)
+        _positive(self, "settle", "rest", "servo.lag", "squeeze", "grip", "patch", zero=True)
         if self.dt > 0.01:
             raise PhysicsError(f"Options.dt: expected a step of 0.01 s or less, got {self.dt}")
         if self.feet not in ("ball", "joint"):

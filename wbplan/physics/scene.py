@@ -132,7 +132,9 @@ def scene_of(
         for pad in span.pads:
             for name in shapes[pad]:
                 spec.geom(name).priority = 2
-                spec.geom(name).friction = [grip_of(span, motion.friction, options), 0.005, 0.0001]
+                grip = grip_of(span, motion.friction, options)
+                spec.geom(name).friction = [grip, grip * options.patch, 0.0001]
+                spec.geom(name).condim = 4
     floor = _add_ground(spec, motion)
     _add_objects(spec, bundle, motion, floor, options)
     pins = _add_pins(spec, motion, options)
