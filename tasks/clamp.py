@@ -28,18 +28,19 @@ SIX = ("limb1_foot", "limb2_foot", *CARRIERS)
 REAR_AND_ARMS = ("limb1_foot", "limb2_foot", "leg4_foot", "leg5_foot")
 
 BOX_SIZE = (0.25, 0.15, 0.12)  # [m]
-BACK = -0.01  # where the body is kept [m] along y while the arms are ahead of it
-TALL = 0.275  # body height [m] for stepping: the shanks' limit of 60 degrees leaves a lower body's feet no room to rise
+BACK = -0.06  # where the body is kept [m] along y while the arms are ahead of it
+TALL = 0.29  # body height [m] for stepping: the shanks' limit of 60 degrees leaves a lower body's feet no room to rise
 STEP = 0.03  # how high feet rise [m]
+HIGH = 0.32  # body height [m] that is aimed at while four legs carry: the taller, the less the servos of their hips hold
 
 
 def script(
     robot: wb.Robot,
     *,
     box_x: float = 0.0,
-    box_y: float = 0.44,
+    box_y: float = 0.50,
     box_z: float = 0.06,
-    mass: float = 0.8,
+    mass: float = 0.5,
     lift: float = 0.10,
     margin: float = 0.04,
     friction: float = 0.7,
@@ -58,7 +59,7 @@ def script(
     """
     stand = robot.state("stand")
     home = {foot: stand.pose(foot).translation for foot in SIX}
-    ahead = {foot: home[foot] + np.array([-0.045 * np.sign(home[foot][0]), 0.22, 0.0]) for foot in STEPPERS}
+    ahead = {foot: home[foot] + np.array([-0.09 * np.sign(home[foot][0]), 0.18, 0.0]) for foot in STEPPERS}
     raised = {f"{limb}_foot": home[f"{limb}_foot"] + np.array([0.0, 0.0, STEP]) for limb in ARMS}
     box = wb.Body("box", mass=mass, size=BOX_SIZE, pose=_pose((box_x, box_y, box_z)))
     arms_out = {joint: value for joint, value in robot.poses["manipulate"].items() if joint.startswith(ARMS)}
@@ -82,9 +83,9 @@ def script(
 
     def free_body(seconds: float) -> list[wb.Task]:
         """The body where the arms need it, else near its stance."""
-        near = wb.MinJerk(wb.AS_IS, _pose((0.0, BACK, 0.24)), seconds)
+        near = wb.MinJerk(wb.AS_IS, _pose((0.0, BACK, HIGH)), seconds)
         return [
-            wb.PoseTask("body", near, weight=((0.5, 0.5, 0.2), 0.5)),
+            wb.PoseTask("body", near, weight=((0.5, 0.5, 20.0), 0.5)),
             _posture(robot.poses["stand"], seconds, 0.1),
         ]
 
@@ -128,9 +129,9 @@ def script(
         (0.0, 2.0, 4.0, 6.0, 8.0),
         (
             wb.AS_IS,
-            beside((0.02, 0.00, lift + 0.03), (4.0, 0.0, 5.0)),
-            beside((0.00, 0.02, lift + 0.02), (3.0, 5.0, 0.0)),
-            beside((-0.02, 0.00, lift + 0.03), (4.0, 0.0, -5.0)),
+            beside((0.005, 0.00, lift + 0.03), (3.0, 0.0, 1.0)),
+            beside((0.00, 0.02, lift + 0.02), (3.0, 3.0, 0.0)),
+            beside((-0.005, 0.00, lift + 0.03), (3.0, 0.0, -1.0)),
             above,
         ),
     )

@@ -40,6 +40,14 @@ def add_damping(joint: Any, value: float) -> None:
         joint.damping += value
 
 
+def keep_movable(body: Any) -> None:
+    """Lets a spec body's centre of mass be moved in the compiled model, where it is now at the origin."""
+    if hasattr(body, "simple"):
+        body.simple = 0
+    if not any(body.ipos):
+        body.ipos = [0.0, 0.0, 1e-9]  # before MuJoCo 4 this alone keeps it apart from the body's frame
+
+
 def full_mass_matrix(model: Any, data: Any) -> Any:
     """(nv, nv) joint-space mass matrix with the armature; MuJoCo 4 takes its arguments in another order."""
     full = np.zeros((model.nv, model.nv))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import Bundle
 from wbplan.errors import PhysicsError
-from wbplan.physics.engine import mujoco
+from wbplan.physics.engine import keep_movable, mujoco
 from wbplan.physics.motion import Motion, grip_of
 from wbplan.physics.options import Options
 from wbplan.physics.spec import FLOOR, OBJECT, ROBOT, STAND, robot_spec
@@ -151,7 +151,7 @@ def _set_solver(spec: Any, options: Options) -> None:
     spec.option.timestep = options.dt
     spec.option.integrator = mj.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mj.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = 10.0
+    spec.option.impratio = 100.0  # at 10 a box that is held creeps down by millimetres a second
     spec.option.gravity = [0.0, 0.0, -9.81]
 
 
@@ -233,6 +233,7 @@ def _add_objects(spec: Any, bundle: Bundle, motion: Motion, floor: float, option
         body = spec.worldbody.add_body(name=name, explicitinertial=True)
         body.mass, body.inertia = item["mass"], np.diag(inertia)
         body.ipos = _com_of(bundle, name)
+        keep_movable(body)
         body.add_freejoint(name=name)
         body.add_geom(
             name=name, type=mj.mjtGeom.mjGEOM_BOX, size=np.array(item["size"]) / 2.0, friction=ground,

@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from wbplan.errors import PhysicsError, listing
-from wbplan.physics.engine import add_damping, mujoco
+from wbplan.physics.engine import add_damping, keep_movable, mujoco
 from wbplan.physics.options import Servo
 from wbplan.robot.urdf_links import mesh_places
 
@@ -49,6 +49,7 @@ def robot_spec(
         raise PhysicsError("robot.urdf: has no link that could be simulated")
     if not any(joint.type == mj.mjtJoint.mjJNT_FREE for joint in spec.joints):
         root.add_freejoint(name=ROOT)
+    keep_movable(root)
     efforts = _limits(urdf_text)
     for joint in spec.joints:
         if joint.type == mj.mjtJoint.mjJNT_FREE:
