@@ -40,9 +40,10 @@ def script(
     box_x: float = 0.0,
     box_y: float = 0.50,
     box_z: float = 0.06,
-    mass: float = 0.5,
+    mass: float = 0.8,
     lift: float = 0.10,
     margin: float = 0.04,
+    stride: float = 0.18,
     friction: float = 0.7,
 ) -> wb.Script:
     """The experiment's steps (a) to (i).
@@ -55,11 +56,12 @@ def script(
         mass: of the box [kg].
         lift: how high the box is lifted [m].
         margin: stability margin kept throughout [m].
+        stride: how far legs 3 and 6 step forward [m]; the less, the nearer the centre of mass comes to their edge.
         friction: of the feet on the ground [-].
     """
     stand = robot.state("stand")
     home = {foot: stand.pose(foot).translation for foot in SIX}
-    ahead = {foot: home[foot] + np.array([-0.09 * np.sign(home[foot][0]), 0.18, 0.0]) for foot in STEPPERS}
+    ahead = {foot: home[foot] + np.array([-stride / 2 * np.sign(home[foot][0]), stride, 0.0]) for foot in STEPPERS}
     raised = {f"{limb}_foot": home[f"{limb}_foot"] + np.array([0.0, 0.0, STEP]) for limb in ARMS}
     box = wb.Body("box", mass=mass, size=BOX_SIZE, pose=_pose((box_x, box_y, box_z)))
     arms_out = {joint: value for joint, value in robot.poses["manipulate"].items() if joint.startswith(ARMS)}

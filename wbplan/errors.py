@@ -56,9 +56,7 @@ class SolveError(WbplanError):
         limits: names of the limits that stand against them.
     """
 
-    def __init__(
-        self, message: str, clashes: Sequence[Relaxation] = (), limits: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, message: str, clashes: Sequence[Relaxation] = (), limits: Sequence[str] = ()) -> None:
         self.clashes = tuple(clashes)
         self.limits = tuple(limits)
         super().__init__(message)
@@ -86,6 +84,10 @@ class ViewError(WbplanError):
 
 class PhysicsError(WbplanError):
     """A plan cannot be simulated."""
+
+
+class PlanFalls(WbplanError):
+    """A plan was simulated and did not stand."""
 
 
 def listing(names: Sequence[str], most: int = 12) -> str:

@@ -37,6 +37,7 @@ LAYERS = [
     "checks",
     "plots",
     "view",
+    "physics",
     "recorder",
     "planner",
     "taskfile",

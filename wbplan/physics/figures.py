@@ -42,9 +42,21 @@ def figure(simulation: Simulation) -> Figure:
     _lines(axes[0, 0], t, 1e3 * m.position[k], "xyz", "base, simulated less planned [mm]")
     _lines(axes[0, 1], t, np.degrees(m.rotation[k]), "xyz", "base rotation, likewise [deg]")
     worst = np.argsort(-np.abs(m.joints).max(axis=0))[:6]
-    _lines(axes[1, 0], t, m.joints[np.ix_(k, worst)], [motion.names[j] for j in worst], "worst joint errors [rad, m]")
+    _lines(
+        axes[1, 0],
+        t,
+        m.joints[np.ix_(k, worst)],
+        [motion.names[j] for j in worst],
+        "worst joint errors [rad, m]",
+    )
     loads = np.argsort(-m.load.max(axis=0))[:6]
-    _lines(axes[1, 1], t, m.load[np.ix_(k, loads)], [motion.names[j] for j in loads], "servo force / effort limit")
+    _lines(
+        axes[1, 1],
+        t,
+        m.load[np.ix_(k, loads)],
+        [motion.names[j] for j in loads],
+        "servo force / effort limit",
+    )
     axes[1, 1].axhline(1.0, color=BOUND, lw=0.8)
     _lines(axes[2, 0], t, m.normal[k], motion.feet, "normal force on each foot [N]")
     _lines(axes[2, 1], t, 1e3 * m.slip[k], motion.feet, "slip of each foot in its stance [mm]")
@@ -74,7 +86,9 @@ def margin_figure(margins: Sequence[float], survivals: Sequence[Survival], stand
         low, high = survival.interval
         x, rate = 1e3 * margin, 100 * survival.rate
         bar = [[rate - 100 * low], [100 * high - rate]]
-        axis.errorbar([x], [rate], yerr=bar, fmt="o" if stood else "X", color=INK if stood else BOUND, capsize=3)
+        axis.errorbar(
+            [x], [rate], yerr=bar, fmt="o" if stood else "X", color=INK if stood else BOUND, capsize=3
+        )
     order = np.argsort(margins)
     axis.plot([1e3 * margins[i] for i in order], [100 * survivals[i].rate for i in order], color=FAINT, lw=1)
     axis.axvline(0.0, color=BOUND, lw=0.8, ls="--")
@@ -97,6 +111,8 @@ def _lines(axis: Axes, time: Array, values: Array, names: Sequence[str], title: 
     for column, name in zip(values.T, names, strict=True):
         axis.plot(time, column, lw=0.9, label=name)
     axis.set_title(title, fontsize=9, color=INK)
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high + 0.25 * (high - low))  # room for the names
     axis.legend(fontsize=6, ncols=3, loc="upper left")
     axis.margins(x=0)
 
@@ -132,7 +148,9 @@ def _trials(axis: Axes, survival: Survival | None) -> None:
         color=[FAINT if step is None else BOUND for step in steps],
     )
     told = f"{survival.stood} of {len(survival.trials)} trials stand ({100 * low:.0f} to {100 * high:.0f} %)"
-    axis.set_title(f"{told}; red: alone it fells the plan at this multiple of its spread", fontsize=9, color=INK)
+    axis.set_title(
+        f"{told}; red: alone it fells the plan at this multiple of its spread", fontsize=9, color=INK
+    )
     axis.tick_params(axis="y", labelsize=7)
 
 

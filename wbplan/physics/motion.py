@@ -180,7 +180,7 @@ def grip_of(span: Span, friction: Array, options: Options) -> float:
 
 
 def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> float:
-    """n pads hold a weight by friction alone where n mu F >= m g; `safety` times that."""
+    """With n pads, friction alone holds a weight alone where n mu F >= m g; `safety` times that."""
     if len(span.pads) < 2 or options.weld:
         return 0.0
     if options.squeeze is not None:
@@ -252,4 +252,5 @@ def _gains(model: Any, options: Options) -> Array:
     for joint in list(model.joints)[2:]:
         sliding = joint.shortname().startswith("JointModelP")
         at.append(options.servo.travel if sliding else options.servo.error)
-    return np.asarray(model.effortLimit[6:], dtype=np.float64) / np.array(at)
+    gains: Array = np.asarray(model.effortLimit[6:], dtype=np.float64) / np.array(at)
+    return gains

@@ -21,7 +21,7 @@ class Servo:
     with speed, in a straight line down to none at the URDF's speed limit: a damping of effort / speed.
 
     Attributes:
-        error: position error [rad] of a turning joint at which the full effort is reached; kp = effort / error.
+        error: position error [rad] at which a turning joint's full effort is reached; kp = effort / error.
         travel: likewise of a sliding joint [m].
         lag: kv / kp [s]; at a steady speed the joint follows that much later.
         inertia: of the motor behind its gear, as a share of the effort [kg m^2 / N m]; the armature.
@@ -91,13 +91,15 @@ class Options:
     reserve: float = 0.6
     ground: float = 0.5
     squeeze: float | None = None
-    safety: float = 2.0
+    safety: float = 1.6
     ramp: float = 0.5
     weld: bool = False
     bounds: Bounds = field(default_factory=Bounds)
 
     def __post_init__(self) -> None:
-        _positive(self, "dt", "servo.error", "servo.travel", "servo.inertia", "safety", "ramp", "ground", "reserve")
+        _positive(
+            self, "dt", "servo.error", "servo.travel", "servo.inertia", "safety", "ramp", "ground", "reserve"
+        )
         _positive(self, *(f"bounds.{item.name}" for item in fields(Bounds)))
         _positive(self, "settle", "rest", "servo.lag", "squeeze", "grip", "patch", zero=True)
         if self.dt > 0.01:

@@ -35,6 +35,7 @@ class Record:
         torque: (K, J) [N m, N] of the servos.
         normal: (K, C) [N] on each foot.
         tangent: (K, C) [N].
+        force: (K, C, 3) [N], world, on each foot.
         slide: (K, C, 3) [m/s] of the foot's contact point over the ground, 0 in the air.
         feet: (K, C, 3) [m], the feet's frames.
         objects: name -> (K, 7) x y z qw qx qy qz.
@@ -52,6 +53,7 @@ class Record:
     torque: Array
     normal: Array
     tangent: Array
+    force: Array
     slide: Array
     feet: Array
     objects: dict[str, Array]
@@ -86,13 +88,14 @@ class _Run:
         K, C, J = self.steps, len(motion.feet), len(motion.names)
         self.base, self.joints, self.torque = np.zeros((K, 7)), np.zeros((K, J)), np.zeros((K, J))
         self.normal, self.tangent = np.zeros((K, C)), np.zeros((K, C))
+        self.force = np.zeros((K, C, 3))
         self.slide, self.feet = np.zeros((K, C, 3)), np.zeros((K, C, 3))
         self.objects = {name: np.zeros((K, 7)) for name in scene.objects}
         self.pads = {pad: np.zeros(K) for pad in scene.pad_geoms}
         self.grounded = {name: np.zeros(K, dtype=bool) for name in scene.objects}
         self.collision, self.stray = np.zeros(K), np.zeros(K, dtype=bool)
         self.clash, self.strayed, self.hardest = "", "", 0.0
-        self.time = np.arange(K) * options.dt - options.settle
+        self.time: Array = np.arange(K, dtype=np.float64) * options.dt - options.settle
         self.targets = motion.joints + motion.offsets
         self.foot_of = np.full(self.model.ngeom, -1)
         for i, geoms in enumerate(scene.foot_geoms):
@@ -123,9 +126,7 @@ class _Run:
     def _drive(self, t: float) -> None:
         motion = self.motion
         sample = motion.sample(max(t, 0.0))
-        if self.sample < 0 or (motion.touching[sample] != motion.touching[self.sample]).any():
-            self._new_contacts(sample)
-        elif motion.phase[sample] != motion.phase[self.sample]:
+        if self.sample < 0 or motion.phase[sample] != motion.phase[self.sample]:
             self._new_contacts(sample)
         self.sample = sample
         self._new_welds(t)
@@ -138,10 +139,8 @@ class _Run:
     def _target(self, t: float) -> Array:
         """The plan's joints at a time, on the straight line between its samples."""
         time = self.motion.time
-        if t <= 0.0:
-            return self.targets[0]
-        k = min(self.motion.sample(t), len(time) - 2)
-        share = min((t - time[k]) / (time[k + 1] - time[k]), 1.0)
+        k = max(0, min(self.motion.sample(t), len(time) - 2))
+        share = max(0.0, min((t - time[k]) / (time[k + 1] - time[k]), 1.0))
         target: Array = (1.0 - share) * self.targets[k] + share * self.targets[k + 1]
         return target
 
@@ -207,11 +206,17 @@ class _Run:
         if len(ground):
             own = np.where(kinds[ground, 0] == ROBOT, geoms[ground, 0], geoms[ground, 1])
             feet, loads, at = self.foot_of[own], normal[ground], rows[ground]
-            sliding = self._sliding(own, contacts.pos[felt[ground]], contacts.frame[felt[ground], :3])
+            axes = contacts.frame[felt[ground]]
+            sliding = self._sliding(own, contacts.pos[felt[ground]], axes[:, :3])
+            upward = np.where(
+                kinds[ground, 1] == ROBOT, 1.0, -1.0
+            )  # on the second shape, along the first axis
             for c, foot in enumerate(feet):
                 if foot >= 0:
                     self.normal[k, foot] += loads[c]
-                    self.tangent[k, foot] += np.hypot(force[at[c] + 1], force[at[c] + 2])
+                    felt_force = force[at[c] : at[c] + 3]
+                    self.tangent[k, foot] += np.hypot(felt_force[1], felt_force[2])
+                    self.force[k, foot] += upward[c] * (felt_force @ axes[c].reshape(3, 3))
                     if loads[c] > LOADED:
                         self.slide[k, foot] = sliding[c]
                 elif loads[c] > LOADED:
@@ -244,6 +249,7 @@ class _Run:
             if len(rows) == 3:
                 force = data.efc_force[rows]
                 self.normal[k, i], self.tangent[k, i] = force[2], np.hypot(force[0], force[1])
+                self.force[k, i] = force
 
     def _sliding(self, geoms: Any, places: Array, axes: Array) -> Array:
         """(n, 3) velocity of shapes' material points at their contacts, along the ground."""
@@ -260,7 +266,7 @@ class _Run:
 
     def _over(self, k: int) -> bool:
         """Whether the robot lies on its side, or the simulation has gone wrong."""
-        w, x, y, z = self.base[k, 3:]
+        x, y = self.base[k, 4:6]
         upright = 1.0 - 2.0 * (x * x + y * y)
         return not np.isfinite(self.base[k]).all() or bool(upright < np.cos(OVER))
 
@@ -268,7 +274,7 @@ class _Run:
         return Record(
             time=self.time[:last], base=self.base[:last], joints=self.joints[:last],
             torque=self.torque[:last], normal=self.normal[:last], tangent=self.tangent[:last],
-            slide=self.slide[:last], feet=self.feet[:last],
+            force=self.force[:last], slide=self.slide[:last], feet=self.feet[:last],
             objects={name: poses[:last] for name, poses in self.objects.items()},
             pads={name: force[:last] for name, force in self.pads.items()},
             grounded={name: on[:last] for name, on in self.grounded.items()},

@@ -72,9 +72,7 @@ class Scene:
         for name, (_, at) in self.objects.items():
             data.qpos[at : at + 7] = to_mujoco(motion.objects[name][0])
         mj.mj_forward(self.model, data)
-        depth = [
-            float(c.dist) for c in data.contact if {int(self.kind[g]) for g in c.geom} == {FLOOR, ROBOT}
-        ]
+        depth = [float(c.dist) for c in data.contact if {int(self.kind[g]) for g in c.geom} == {FLOOR, ROBOT}]
         data.qpos[2] -= min([0.0, *depth])
         data.ctrl[self.act] = motion.joints[0]
         mj.mj_forward(self.model, data)
@@ -82,12 +80,12 @@ class Scene:
 
 
 def to_mujoco(pose: Array) -> Array:
-    """x y z qx qy qz qw -> x y z qw qx qy qz."""
+    """From x y z qx qy qz qw to x y z qw qx qy qz."""
     return pose[..., [0, 1, 2, 6, 3, 4, 5]]
 
 
 def from_mujoco(pose: Array) -> Array:
-    """x y z qw qx qy qz -> x y z qx qy qz qw."""
+    """From x y z qw qx qy qz to x y z qx qy qz qw."""
     return pose[..., [0, 1, 2, 4, 5, 6, 3]]
 
 
@@ -319,7 +317,12 @@ def _exclude_touching(spec: Any, motion: Motion) -> None:
 
 
 def _compiled(
-    spec: Any, motion: Motion, shapes: Mapping[str, list[str]], pins: list[str], welds: list[str], floor: float
+    spec: Any,
+    motion: Motion,
+    shapes: Mapping[str, list[str]],
+    pins: list[str],
+    welds: list[str],
+    floor: float,
 ) -> Scene:
     mj = mujoco()
     model = spec.compile()

@@ -23,9 +23,7 @@ _MENDED = f'{_STRICT} balanceinertia="true" boundmass="1e-6" boundinertia="1e-9"
 _READ_BY_MUJOCO = (".stl", ".obj", ".msh")
 
 
-def robot_spec(
-    urdf_text: str, servo: Servo, *, folders: Sequence[Path] = ()
-) -> Any:
+def robot_spec(urdf_text: str, servo: Servo, *, folders: Sequence[Path] = ()) -> Any:
     """The robot alone, with a free root and a position servo for every joint.
 
     Args:

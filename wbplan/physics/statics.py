@@ -14,7 +14,9 @@ Array = NDArray[np.float64]
 FADE = 0.1  #: [s] over which a leg takes load up, and gives it back
 
 
-def contact_forces(wrench: Array, points: Array, weights: Array, friction: Array, J: Array, bias: Array) -> Array:
+def contact_forces(
+    wrench: Array, points: Array, weights: Array, friction: Array, J: Array, bias: Array
+) -> Array:
     """(3 C,) forces [N] at C contacts that hold a body, with small torques in the joints behind them.
 
     min || (bias - J^T f) ||^2_W   s.t.   G f = wrench,
@@ -108,7 +110,8 @@ def pressing_torques(model: Any, q: Array, loads: Sequence[tuple[int, Array]]) -
     torque = np.zeros(model.nv)
     for frame, force in loads:
         torque -= pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3].T @ force
-    return torque[6:]
+    own: Array = torque[6:]
+    return own
 
 
 def faded(torques: Array, time: Array, seconds: float = FADE) -> Array:
@@ -120,4 +123,5 @@ def faded(torques: Array, time: Array, seconds: float = FADE) -> Array:
     padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
     total = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), padded]), axis=0)
     width = 2 * half + 1
-    return (total[width:] - total[:-width]) / width
+    mean: Array = (total[width:] - total[:-width]) / width
+    return mean

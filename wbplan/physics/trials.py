@@ -213,9 +213,8 @@ def _climb(
     job: _Job, seed: int, spread: Spread, motion: Motion, workers: int | None, progress: Progress | None
 ) -> dict[str, float | None]:
     """Each kind alone at full size, in drawn directions, one multiple after the other."""
-    felled: dict[str, float | None] = dict.fromkeys(KINDS)
     kinds = [kind for kind in KINDS if motion.objects or not kind.startswith("object")]
-    felled = {kind: None for kind in kinds}
+    felled: dict[str, float | None] = dict.fromkeys(kinds)
     for step in LADDER:
         left = [kind for kind in kinds if felled[kind] is None]
         draws = [
@@ -232,17 +231,24 @@ def _climb(
 
 def _full(off: Disturbance, kind: str, rung: int, spread: Spread, step: float) -> Disturbance:
     """A draw at the end of its range: the drawn direction, or one of the two signs, at full size."""
-    size, sign = step * getattr(spread, kind), (-1.0, 1.0)[rung % 2]
+    size, sign = step * float(getattr(spread, kind)), (-1.0, 1.0)[rung % 2]
+    changed: Any
     if kind in ("mass", "object_mass", "friction", "gain"):
-        return replace(off, **{kind: max(1.0 + sign * size, 0.02)})
-    if kind == "latency":
-        return replace(off, latency=size)
-    if kind == "push":
+        changed = max(1.0 + sign * size, 0.02)
+    elif kind == "latency":
+        changed = size
+    elif kind == "push":
         push = off.pushes[0]
-        unit = np.array(push.force) / np.linalg.norm(push.force) * size / push.seconds
-        return replace(off, pushes=(replace(push, force=tuple(float(x) for x in unit)),))
-    vector = np.array(getattr(off, kind))
-    return replace(off, **{kind: tuple(float(x) for x in vector / np.linalg.norm(vector) * size)})
+        kind, changed = "pushes", (replace(push, force=_scaled(push.force, size / push.seconds)),)
+    else:
+        changed = _scaled(getattr(off, kind), size)
+    return replace(off, **{kind: changed})
+
+
+def _scaled(vector: Sequence[float], size: float) -> Any:
+    """The vector, as long as told."""
+    values = np.array(vector)
+    return tuple(float(x) for x in values / np.linalg.norm(values) * size)
 
 
 @final

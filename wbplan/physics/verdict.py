@@ -86,7 +86,9 @@ class Measures:
     collision: Array
 
 
-def measure(record: Record, motion: Motion, effort: Array, options: Options, friction: float = 1.0) -> Measures:
+def measure(
+    record: Record, motion: Motion, effort: Array, options: Options, friction: float = 1.0
+) -> Measures:
     """Compares a replay with its plan.
 
     Args:
@@ -98,9 +100,7 @@ def measure(record: Record, motion: Motion, effort: Array, options: Options, fri
     """
     from_start = record.time >= -1e-9
     time = record.time[from_start]
-    sample = np.clip(
-        np.searchsorted(motion.time, time + 1e-9, side="right") - 1, 0, len(motion.time) - 1
-    )
+    sample = np.clip(np.searchsorted(motion.time, time + 1e-9, side="right") - 1, 0, len(motion.time) - 1)
     joints = record.joints[from_start] - _between(motion.joints, motion.time, time)
     position = record.base[from_start, :3] - _between(motion.base[:, :3], motion.time, time)
     planned = _matrices(motion.base[:, 3:])[sample]
@@ -137,7 +137,9 @@ def judge(m: Measures, record: Record, motion: Motion, options: Options) -> Verd
         off = (drift > bounds.drift) | (m.turn[name] > bounds.turn)
         if off.any():
             k = int(np.argmax(off))
-            how = f"'{name}' is {1e3 * drift[k]:.0f} mm and {np.degrees(m.turn[name][k]):.0f} deg off its plan"
+            how = (
+                f"'{name}' is {1e3 * drift[k]:.0f} mm and {np.degrees(m.turn[name][k]):.0f} deg off its plan"
+            )
             events.append((k, "drops", how))
     slid = m.slip > bounds.slip
     if slid.any():
@@ -208,9 +210,7 @@ def summary(m: Measures, record: Record, motion: Motion) -> dict[str, Any]:
         "normal_force": worst(m.normal, motion.feet),
         "self_collision": {**worst(m.collision), "links": record.links[0]},
         "strayed": record.links[1],
-        "objects": {
-            name: {"drift": worst(m.drift[name]), "turn": worst(m.turn[name])} for name in m.drift
-        },
+        "objects": {name: {"drift": worst(m.drift[name]), "turn": worst(m.turn[name])} for name in m.drift},
         "pads": {pad: float(force.max(initial=0.0)) for pad, force in record.pads.items()},
     }
     return result
