@@ -46,8 +46,8 @@ class Bounds:
         turn: [rad], likewise.
     """
 
-    tilt: float = 0.5
-    sink: float = 0.08
+    tilt: float = 0.15
+    sink: float = 0.05
     slip: float = 0.02
     drift: float = 0.04
     turn: float = 0.5

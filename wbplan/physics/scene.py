@@ -16,7 +16,7 @@ from wbplan.errors import PhysicsError
 from wbplan.physics.engine import keep_movable, mujoco
 from wbplan.physics.motion import Motion, grip_of
 from wbplan.physics.options import Options
-from wbplan.physics.spec import FLOOR, OBJECT, ROBOT, STAND, robot_spec
+from wbplan.physics.spec import FLOOR, NOTHING, OBJECT, ROBOT, STAND, robot_spec
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -125,7 +125,7 @@ def scene_of(
             geom = spec.geom(name)
             geom.priority = 1
             if options.feet == "joint":
-                geom.contype = geom.conaffinity = 0
+                geom.contype = geom.conaffinity = NOTHING
     for span in motion.spans:
         for pad in span.pads:
             for name in shapes[pad]:
@@ -274,6 +274,7 @@ def _add_pins(spec: Any, motion: Motion, options: Options) -> list[str]:
         spec.add_equality(
             name=f"{foot}_pin", type=mj.mjtEq.mjEQ_CONNECT, objtype=mj.mjtObj.mjOBJ_BODY, name1=foot,
             name2="world", active=False,
+            solref=[2.0 * options.dt, 1.0], solimp=[0.999, 0.9999, 0.001, 0.5, 2.0],
         )  # fmt: skip
     return [f"{foot}_pin" for foot in motion.feet]
 

@@ -22,7 +22,7 @@ from wbplan.physics.motion import Motion, grip_of, motion_of
 from wbplan.physics.options import Options
 from wbplan.physics.run import Record, run
 from wbplan.physics.scene import Scene, from_mujoco, scene_of
-from wbplan.physics.trials import Progress, Spread, Survival, survey
+from wbplan.physics.trials import LADDER, Progress, Spread, Survival, survey
 from wbplan.physics.verdict import Measures, Verdict, judge, measure, summary
 from wbplan.robot import load_robot
 
@@ -135,7 +135,7 @@ def simulate(
     seed: int = 0,
     spread: Spread | None = None,
     workers: int | None = None,
-    ladder: bool = True,
+    ladder: Sequence[float] = LADDER,
     disturbance: Disturbance | None = None,
     ignored: Ignored | None = None,
     folders: Sequence[str | Path] = (),
@@ -150,7 +150,7 @@ def simulate(
         seed: of the trials.
         spread: how far off things may be in them.
         workers: processes for them; None: one for each core.
-        ladder: with the trials, also find out which disturbance alone fells the plan first.
+        ladder: with the trials, multiples of its spread at which each disturbance alone is tried.
         disturbance: of the first replay; None: none.
         ignored: pairs of links that may overlap; None: as the SRDF has them where the bundle's robot is a
             shipped one, else those that touch in the first pose.

@@ -13,8 +13,8 @@ from wbplan.physics.engine import add_damping, keep_movable, mujoco
 from wbplan.physics.options import Servo
 from wbplan.robot.urdf_links import mesh_places
 
-FLOOR, ROBOT, OBJECT, STAND = 1, 2, 4, 8
-"""Collision bits; a stand is what an object stands on."""
+FLOOR, ROBOT, OBJECT, STAND, NOTHING = 1, 2, 4, 8, 16
+"""Collision bits; a stand is what an object stands on. (What has no bit at all is left out of the model.)"""
 
 ROOT = "wbplan_root"
 

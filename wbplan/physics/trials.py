@@ -173,7 +173,7 @@ def survey(
     seed: int = 0,
     spread: Spread | None = None,
     workers: int | None = None,
-    ladder: bool = True,
+    ladder: Sequence[float] = LADDER,
     progress: Progress | None = None,
 ) -> Survival:
     """Replays a plan many times, each time with everything a little off.
@@ -187,7 +187,7 @@ def survey(
         seed: of the draws; a trial depends on it and on its number only, never on the workers.
         spread: how far off things may be.
         workers: processes; None: as many as there are cores, 1: none but this one.
-        ladder: also try every kind alone, at growing multiples, until it fells the plan.
+        ladder: multiples of its spread at which each kind alone is tried, until it fells the plan.
         progress: called with the share that is done, and what it was.
 
     Raises:
@@ -205,17 +205,23 @@ def survey(
     done = tuple(Trial(n, off, verdict) for n, off, verdict in zip(numbers, draws, verdicts, strict=True))
     felled: dict[str, float | None] = {}
     if ladder:
-        felled = _climb(job, seed, spread, motion, workers, progress)
+        felled = _climb(job, seed, spread, motion, ladder, workers, progress)
     return Survival(done, seed, spread, felled)
 
 
 def _climb(
-    job: _Job, seed: int, spread: Spread, motion: Motion, workers: int | None, progress: Progress | None
+    job: _Job,
+    seed: int,
+    spread: Spread,
+    motion: Motion,
+    ladder: Sequence[float],
+    workers: int | None,
+    progress: Progress | None,
 ) -> dict[str, float | None]:
     """Each kind alone at full size, in drawn directions, one multiple after the other."""
     kinds = [kind for kind in KINDS if motion.objects or not kind.startswith("object")]
     felled: dict[str, float | None] = dict.fromkeys(kinds)
-    for step in LADDER:
+    for step in sorted(ladder):
         left = [kind for kind in kinds if felled[kind] is None]
         draws = [
             _full(draw(seed, 1_000_000 + r, spread, motion.duration, (kind,), step), kind, r, spread, step)
