@@ -19,6 +19,7 @@ STRIDES = (0.05, 0.06, 0.065, 0.07, 0.08, 0.10, 0.14, 0.18)  # [m]
 
 
 def main(trials: int, picture: Path) -> None:
+    """One plan for each stride: its least margin, how many of its trials stand, and the picture of it."""
     task = load_task("clamp")
     robot = wb.load_robot(task.robot)
     margins, survivals, stands = [], [], []
@@ -29,8 +30,8 @@ def main(trials: int, picture: Path) -> None:
         margin = float(np.nanmin(plan.trajectory.margin))
         low, high = done.survival.interval
         print(
-            f"stride {1e3 * stride:3.0f} mm, margin {1e3 * margin:6.1f} mm: {done.survival.stood} of {trials} "
-            f"({100 * low:.0f} to {100 * high:.0f} %); undisturbed: {done.verdict}",
+            f"stride {1e3 * stride:.0f} mm, margin {1e3 * margin:6.1f} mm: "
+            f"{done.survival.stood} of {trials} ({100 * low:.0f} to {100 * high:.0f} %); alone: {done.verdict.word}",
             flush=True,
         )
         margins.append(margin)
@@ -40,4 +41,7 @@ def main(trials: int, picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20, Path(sys.argv[2] if len(sys.argv) > 2 else "margins.png"))
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 20,
+        Path(sys.argv[2] if len(sys.argv) > 2 else "margins.png"),
+    )

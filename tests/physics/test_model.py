@@ -124,5 +124,5 @@ def test_options_refuse(field: str, value: object) -> None:
 
 def test_a_joint_without_effort_is_refused() -> None:
     text = ROBOT.urdf_text.replace('effort="5.099458"', 'effort="0"', 1)
-    with pytest.raises(PhysicsError, match="limb1_joint1.*effort"):
+    with pytest.raises(PhysicsError, match=r"limb1_joint1.*effort"):
         robot_spec(text, Servo())

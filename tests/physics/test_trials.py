@@ -33,11 +33,15 @@ def test_what_kills_first_is_found(leaning) -> None:
         tilt=1e-4, push=20.0,
     )  # fmt: skip
     seen: list[float] = []
-    survival = leaning[0.03].simulate(
-        trials=1, workers=2, spread=only, ladder=(1.0,), progress=lambda share, what: seen.append(share)
-    ).survival
+    survival = (
+        leaning[0.03]
+        .simulate(
+            trials=1, workers=2, spread=only, ladder=(1.0,), progress=lambda share, what: seen.append(share)
+        )
+        .survival
+    )
     assert survival is not None
-    assert survival.first_killer == ("push", 1.0)
+    assert survival.first_killers == ("push",)
     assert [kind for kind, step in survival.ladder.items() if step is not None] == ["push"]
     assert seen
     assert max(seen) == 1.0

@@ -91,7 +91,7 @@ class Options:
     reserve: float = 0.6
     ground: float = 0.5
     squeeze: float | None = None
-    safety: float = 1.6
+    safety: float = 2.0
     ramp: float = 0.5
     weld: bool = False
     bounds: Bounds = field(default_factory=Bounds)

@@ -211,7 +211,7 @@ def _trials(survival: Survival) -> dict[str, Any]:
         "interval_95": list(survival.interval),
         "verdicts": {word: words.count(word) for word in sorted(set(words))},
         "each_alone": dict(survival.ladder),
-        "kills_first": None if survival.first_killer is None else survival.first_killer[0],
+        "kills_first": list(survival.first_killers),
         "failures": [
             {"trial": t.number, "verdict": asdict(t.verdict), "disturbance": asdict(t.disturbance)}
             for t in survival.trials

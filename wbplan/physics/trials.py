@@ -52,7 +52,7 @@ class Spread:
 
 
 KINDS: tuple[str, ...] = tuple(Spread.__dataclass_fields__)
-LADDER = (1.0, 2.0, 4.0)  #: multiples of its spread at which each kind alone is tried
+LADDER = (0.5, 1.0, 2.0, 4.0)  #: multiples of its spread at which each kind alone is tried
 RUNGS = 2  #: draws on each step of the ladder
 
 
@@ -106,10 +106,11 @@ class Survival:
         return wilson(self.stood, len(self.trials))
 
     @property
-    def first_killer(self) -> tuple[str, float] | None:
-        """The kind that alone fells the plan at the smallest multiple of its spread, and that multiple."""
+    def first_killers(self) -> tuple[str, ...]:
+        """The kinds that alone fell the plan at the smallest multiple of their spread."""
         felled = {kind: step for kind, step in self.ladder.items() if step is not None}
-        return min(felled.items(), key=lambda item: item[1]) if felled else None
+        least = min(felled.values(), default=None)
+        return tuple(kind for kind, step in felled.items() if step == least)
 
 
 def wilson(good: int, n: int) -> tuple[float, float]:
