@@ -31,7 +31,7 @@ def main(trials: int, picture: Path) -> None:
         low, high = done.survival.interval
         print(
             f"stride {1e3 * stride:.0f} mm, margin {1e3 * margin:6.1f} mm: "
-            f"{done.survival.stood} of {trials} ({100 * low:.0f} to {100 * high:.0f} %); alone: {done.verdict.word}",
+            f"{done.survival.stood} stand ({100 * low:.0f} to {100 * high:.0f} %); {done.verdict.word}",
             flush=True,
         )
         margins.append(margin)
