@@ -28,20 +28,22 @@ SIX = ("limb1_foot", "limb2_foot", *CARRIERS)
 REAR_AND_ARMS = ("limb1_foot", "limb2_foot", "leg4_foot", "leg5_foot")
 
 BOX_SIZE = (0.25, 0.15, 0.12)  # [m]
-BACK = -0.01  # where the body is kept [m] along y while the arms are ahead of it
-TALL = 0.275  # body height [m] for stepping: lower down, the shanks' limit leaves feet no room to rise
+BACK = -0.06  # where the body is kept [m] along y while the arms are ahead of it
+TALL = 0.29  # body height [m] for stepping: lower down, the shanks' limit leaves feet no room to rise
 STEP = 0.03  # how high feet rise [m]
+HIGH = 0.32  # body height [m] aimed at while four legs carry: the taller, the less their hips' servos hold
 
 
 def script(
     robot: wb.Robot,
     *,
     box_x: float = 0.0,
-    box_y: float = 0.44,
+    box_y: float = 0.50,
     box_z: float = 0.06,
     mass: float = 0.8,
     lift: float = 0.10,
     margin: float = 0.04,
+    stride: float = 0.18,
     friction: float = 0.7,
 ) -> wb.Script:
     """The experiment's steps (a) to (i).
@@ -54,11 +56,14 @@ def script(
         mass: of the box [kg].
         lift: how high the box is lifted [m].
         margin: stability margin kept throughout [m].
+        stride: how far legs 3 and 6 step forward [m]; the less, the nearer the CoM comes to their edge.
         friction: of the feet on the ground [-].
     """
     stand = robot.state("stand")
     home = {foot: stand.pose(foot).translation for foot in SIX}
-    ahead = {foot: home[foot] + np.array([-0.045 * np.sign(home[foot][0]), 0.22, 0.0]) for foot in STEPPERS}
+    ahead = {
+        foot: home[foot] + np.array([-stride / 2 * np.sign(home[foot][0]), stride, 0.0]) for foot in STEPPERS
+    }
     raised = {f"{limb}_foot": home[f"{limb}_foot"] + np.array([0.0, 0.0, STEP]) for limb in ARMS}
     box = wb.Body("box", mass=mass, size=BOX_SIZE, pose=_pose((box_x, box_y, box_z)))
     arms_out = {joint: value for joint, value in robot.poses["manipulate"].items() if joint.startswith(ARMS)}
@@ -82,9 +87,9 @@ def script(
 
     def free_body(seconds: float) -> list[wb.Task]:
         """The body where the arms need it, else near its stance."""
-        near = wb.MinJerk(wb.AS_IS, _pose((0.0, BACK, 0.24)), seconds)
+        near = wb.MinJerk(wb.AS_IS, _pose((0.0, BACK, HIGH)), seconds)
         return [
-            wb.PoseTask("body", near, weight=((0.5, 0.5, 0.2), 0.5)),
+            wb.PoseTask("body", near, weight=((0.5, 0.5, 20.0), 0.5)),
             _posture(robot.poses["stand"], seconds, 0.1),
         ]
 
@@ -131,9 +136,9 @@ def script(
         (0.0, 2.0, 4.0, 6.0, 8.0),
         (
             wb.AS_IS,
-            beside((0.02, 0.00, lift + 0.03), (4.0, 0.0, 5.0)),
-            beside((0.00, 0.02, lift + 0.02), (3.0, 5.0, 0.0)),
-            beside((-0.02, 0.00, lift + 0.03), (4.0, 0.0, -5.0)),
+            beside((0.005, 0.00, lift + 0.03), (3.0, 0.0, 1.0)),
+            beside((0.00, 0.02, lift + 0.02), (3.0, 3.0, 0.0)),
+            beside((-0.005, 0.00, lift + 0.03), (3.0, 0.0, -1.0)),
             above,
         ),
     )

@@ -1,7 +1,7 @@
-"""The command line: list, run, check, view, robot, papers.
+"""The command line: list, run, check, simulate, view, robot, papers.
 
-Exit codes: 0 done, and every promise holds; 1 planned but a promise is broken, or no plan exists; 2 bad usage
-or bad input, told on stderr without a traceback; 130 interrupted.
+Exit codes: 0 done, and every promise holds; 1 a promise is broken, no plan exists, or it does not stand;
+2 bad usage or bad input, told on stderr without a traceback; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -22,11 +22,13 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from wbplan import catalog
 from wbplan.bundle import Bundle, is_bundle
 from wbplan.checks import check as recompute
-from wbplan.errors import BundleError, CheckFailed, SolveError, SpecError, WbplanError
+from wbplan.errors import BundleError, CheckFailed, PlanFalls, SolveError, SpecError, WbplanError
 from wbplan.live import LiveView
 from wbplan.papers import DIFFERS, report, summary
+from wbplan.physics import ghost_of
+from wbplan.physics import simulate as replay
 from wbplan.planner import plan
-from wbplan.printing import print_plan, print_robot
+from wbplan.printing import print_plan, print_robot, print_simulation
 from wbplan.robot import Robot, load_robot
 from wbplan.script import Script
 from wbplan.taskfile import glance, load_task
@@ -78,7 +80,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return _say(_in_one_line(error) + hint, BAD_INPUT)
     except SolveError as error:
         return _say(f"no plan exists: {error}", BROKEN)
-    except CheckFailed as error:
+    except (CheckFailed, PlanFalls) as error:
         return _say(str(error), BROKEN)
     except WbplanError as error:
         return _say(str(error), BAD_INPUT)
@@ -174,6 +176,30 @@ def check(
     checked = recompute(Bundle.read(folder))
     _console().print(checked.table())
     checked.require()
+
+
+@app.command()
+def simulate(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A bundle, as `wbplan run` writes it.")],
+    trials: Annotated[
+        int, typer.Option(min=0, help="As many more replays, each with everything a little off.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the trials.")] = 0,
+    view: Annotated[
+        bool, typer.Option("--view", help="Serve plan and simulated robot in Meshcat until Ctrl-C.")
+    ] = False,
+) -> None:
+    """Replay a bundle with contact, friction and servos; exit code 1 where it does not stand."""
+    bundle = Bundle.read(folder)
+    with _progress_bar(str(folder)) as progress:
+        done = replay(bundle, trials=trials, seed=seed, progress=progress)
+    report = done.save(folder)
+    print_simulation(done, _console())
+    print(f"written to {report}")
+    if view:
+        play(bundle, HOST, ghost=ghost_of(done))
+    if not done.stands:
+        raise PlanFalls(str(done.verdict))
 
 
 @app.command()

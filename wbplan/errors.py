@@ -82,6 +82,14 @@ class ViewError(WbplanError):
     """The viewer cannot start or be reached."""
 
 
+class PhysicsError(WbplanError):
+    """A plan cannot be simulated."""
+
+
+class PlanFalls(WbplanError):
+    """A plan was simulated and did not stand."""
+
+
 def listing(names: Sequence[str], most: int = 12) -> str:
     """Names for a message: all where they are few, else the first ones and how many more there are."""
     shown = ", ".join(sorted(names)[:most]) or "none"

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from wbplan.robot import Robot
 from wbplan.script import Phase, Script
 from wbplan.state import State
 from wbplan.tick import Loop
+
+if TYPE_CHECKING:
+    from wbplan.physics import Simulation
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -74,6 +77,21 @@ class Plan:
                 "plots.png": lambda path: plots.save(self.bundle, path),
             },
         )
+
+    def simulate(self, options: Any = None, **asked: Any) -> Simulation:
+        """Replay the plan in MuJoCo, with contact, friction and servos.
+
+        Args:
+            options: `wbplan.physics.Options`, what is assumed; None: the usual.
+            asked: `trials`, `seed`, `workers` and the rest of what `wbplan.physics.simulate` takes.
+
+        Raises:
+            PhysicsError: MuJoCo is missing, or the plan cannot be simulated.
+        """
+        from wbplan.physics import simulate
+
+        ignored = self.robot.ignored_collisions if self.robot.srdf_path else None
+        return simulate(self.bundle, options, **{"ignored": ignored, "folders": self._folders, **asked})
 
     def view(self, host: str = "127.0.0.1", port: int | None = None) -> Any:
         """Serve the animation in Meshcat; returns the server, with `.url` and `.stop()`."""

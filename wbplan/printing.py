@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from wbplan.bundle import NO_MARGIN, Bundle
+from wbplan.physics import Simulation
 from wbplan.robot import Robot
 
 
@@ -52,6 +53,60 @@ def print_robot(robot: Robot, console: Console) -> None:
     links = [frame.name for frame in robot.model.frames if frame.type == pin.BODY]
     console.print("frames of links: " + ", ".join(links), soft_wrap=True)
     console.print("problems: none")
+
+
+def print_simulation(simulation: Simulation, console: Console) -> None:
+    """Prints a simulation's verdict, what was measured, and what came of the trials.
+
+    Args:
+        simulation: the simulation.
+        console: where to.
+    """
+    report = simulation.report()
+    measured: Mapping[str, Any] = report["measured"]
+    table = _table("measured", "worst", "t [s]", "where")
+    rows = [
+        ("base off its plan [mm]", "base_position", 1e3),
+        ("base off its plan [deg]", "base_rotation", 180.0 / np.pi),
+        ("joint off its plan [rad, m]", "joint_error", 1.0),
+        ("servo force / effort", "torque", 1.0),
+        ("foot slip [mm]", "foot_slip", 1e3),
+        ("friction used [share]", "friction_use", 1.0),
+        ("foot lifted off [s]", "lift_off", 1.0),
+        ("force between links [N]", "self_collision", 1.0),
+    ]
+    for title, key, scale in rows:
+        row = measured[key]
+        where = row.get("where") or (row.get("links", "") if row["worst"] > 0.0 else "")
+        table.add_row(title, f"{scale * row['worst']:.3g}", f"{row['time'] or 0.0:.2f}", where)
+    for name, off in measured["objects"].items():
+        drift, turn = off["drift"], off["turn"]
+        table.add_row(f"{name} off its plan [mm]", f"{1e3 * drift['worst']:.3g}", f"{drift['time']:.2f}", "")
+        table.add_row(
+            f"{name} off its plan [deg]", f"{np.degrees(turn['worst']):.3g}", f"{turn['time']:.2f}", ""
+        )
+    console.print(table)
+    for name, force in report["squeeze"].items():
+        console.print(
+            f"  assumed: '{name}' is pressed with {force:.1f} N, friction {report['grip'][name]:.2f}"
+        )
+    console.print(
+        f"  {report['engine']}: {simulation.seconds:.2f} s, {simulation.real_time_factor:.1f} times real time"
+    )
+    console.print(f"undisturbed: {simulation.verdict}", soft_wrap=True)
+    survival = simulation.survival
+    if survival is not None:
+        low, high = survival.interval
+        told = ", ".join(f"{word} {n}" for word, n in report["trials"]["verdicts"].items())
+        console.print(
+            f"disturbed: {survival.stood} of {len(survival.trials)} stand, {100 * survival.rate:.0f} % "
+            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %); {told}"
+        )
+        alone = [f"{kind} at {step:g}" for kind, step in survival.ladder.items() if step is not None]
+        console.print(
+            "what fells it alone, at which multiple of its spread: " + (", ".join(alone) or "nothing"),
+            soft_wrap=True,
+        )
 
 
 def _phases(bundle: Bundle) -> Table:

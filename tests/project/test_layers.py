@@ -40,6 +40,7 @@ LAYERS = [
     "checks",
     "plots",
     "view",
+    "physics",
     "recorder",
     "planner",
     "papers",

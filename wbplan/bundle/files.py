@@ -17,7 +17,8 @@ from wbplan.errors import BundleError
 
 PLAN, URDF, ARRAYS, TABLE = "plan.json", "robot.urdf", "trajectory.npz", "trajectory.csv"
 SCENE, PLOTS = "scene.html", "plots.png"
-FILES = (PLAN, URDF, ARRAYS, TABLE, SCENE, PLOTS)
+PHYSICS = ("physics.json", "physics.png")  # of an older plan they would tell lies
+FILES = (PLAN, URDF, ARRAYS, TABLE, SCENE, PLOTS, *PHYSICS)
 
 
 def is_bundle(folder: Path) -> bool:

@@ -61,7 +61,7 @@ class Track:
 
     Attributes:
         path: the node.
-        key: "position", "quaternion" (x y z w) or "visible".
+        key: "position", "quaternion" (x y z w), "scale" or "visible".
         times: (K,) [s], rising.
         values: (K, 3), (K, 4) or (K,) of bool.
     """
@@ -73,7 +73,7 @@ class Track:
 
     def lower(self) -> dict[str, Any]:
         """The track inside its node's clip."""
-        kind = {"position": "vector3", "quaternion": "quaternion", "visible": "bool"}[self.key]
+        kind = {"quaternion": "quaternion", "visible": "bool"}.get(self.key, "vector3")
         values = self.values.tolist() if kind == "bool" else floats(self.values)
         return {"name": f".{self.key}", "type": kind, "times": floats(self.times), "values": values}
 

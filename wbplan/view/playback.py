@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.errors import SpecError, ViewError
@@ -18,6 +17,8 @@ from wbplan.geometry import support_polygon
 from wbplan.view import shapes
 from wbplan.view.drawing import DISC_Z, GRADES, Drawing, body_sizes, box_corners, grade, node, pose7
 from wbplan.view.figure import Figure
+from wbplan.view.ghost import Ghost, draw_ghost
+from wbplan.view.keys import FINE, apart, changes, pick, quaternions
 from wbplan.view.messages import SetAnimation, Store, Track, Window, floats
 from wbplan.view.page import still_page
 from wbplan.view.scene import facing, scale
@@ -29,11 +30,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: Pictures a second.
-RATE = 30.0
-#: Positions [m] and quaternions are rounded to this in the animation, far below a pixel.
-FINE = 1e-5
-
 
 def serve(
     bundle: Bundle,
@@ -41,6 +37,7 @@ def serve(
     port: int | None = None,
     *,
     package_dirs: Sequence[str | Path] = (),
+    ghost: Ghost | None = None,
 ) -> Server:
     """Serves a plan's animation; the page repeats it until told otherwise.
 
@@ -49,6 +46,7 @@ def serve(
         host: address to listen on.
         port: port to listen on; None takes a free one.
         package_dirs: where the robot's meshes are looked for.
+        ghost: a second robot, simulated, seen beside the planned one.
 
     Returns:
         The running server: `.url`, `.wait()`, `.stop()`.
@@ -58,7 +56,7 @@ def serve(
     """
     server = Server(host, port, title=_title(bundle))
     try:
-        draw_plan(bundle, server, package_dirs=package_dirs)
+        draw_plan(bundle, server, package_dirs=package_dirs, ghost=ghost)
     except BaseException:
         server.stop()
         raise
@@ -71,6 +69,7 @@ def play(
     port: int | None = None,
     *,
     package_dirs: Sequence[str | Path] = (),
+    ghost: Ghost | None = None,
 ) -> None:
     """Serves a plan's animation, prints where, and returns when Ctrl-C is pressed.
 
@@ -79,11 +78,12 @@ def play(
         host: address to listen on.
         port: port to listen on; None takes a free one.
         package_dirs: where the robot's meshes are looked for.
+        ghost: as `serve` takes it.
 
     Raises:
         ViewError: as `serve` does.
     """
-    with serve(bundle, host, port, package_dirs=package_dirs) as server:
+    with serve(bundle, host, port, package_dirs=package_dirs, ghost=ghost) as server:
         try:  # from the moment that Ctrl-C is offered
             print(f"{_title(bundle)}: {server.url} (Ctrl-C ends it)", flush=True)
             server.wait()
@@ -150,18 +150,21 @@ def inline(bundle: Bundle, *, height: int = 520, package_dirs: Sequence[str | Pa
     return show(f'<div><iframe srcdoc="{text}" style="{style}" title="{title}"></iframe></div>')
 
 
-def draw_plan(bundle: Bundle, target: Window, *, package_dirs: Sequence[str | Path] = ()) -> None:
+def draw_plan(
+    bundle: Bundle, target: Window, *, package_dirs: Sequence[str | Path] = (), ghost: Ghost | None = None
+) -> None:
     """Draws a plan with its whole motion into a window.
 
     Args:
         bundle: the plan.
         target: a `Server` or a `Store`.
         package_dirs: where the robot's meshes are looked for.
+        ghost: as `serve` takes it.
 
     Raises:
         ViewError: the plan has no samples, or a mesh is missing.
     """
-    _Playback(bundle, target, package_dirs).draw()
+    _Playback(bundle, target, package_dirs).draw(ghost)
 
 
 class _Playback:
@@ -175,7 +178,7 @@ class _Playback:
         self.figure = Figure(bundle.urdf, package_dirs=package_dirs)
         self.draw_in = Drawing(target, unit=scale(self.figure))
         self.phases: list[Mapping[str, Any]] = list(self.plan["phases"])
-        self.picked = _pick(self.trajectory.time, self.trajectory.phase)
+        self.picked = pick(self.trajectory.time, self.trajectory.phase)
         self.time: Array = self.trajectory.time[self.picked] - self.trajectory.time[0]
         self.phase: NDArray[np.int64] = np.clip(self.trajectory.phase[self.picked], 0, len(self.phases) - 1)
         self.duration = max(float(self.time[-1]), 1e-3)
@@ -184,7 +187,7 @@ class _Playback:
         self.tips = [name for name in dict.fromkeys(_holding(self.phases)) if self.figure.has(name)]
         self.tracks: list[Track] = []
 
-    def draw(self) -> None:
+    def draw(self, ghost: Ghost | None = None) -> None:
         """Draws everything; the animation, which binds to what is there, last."""
         self._kinematics()
         self._robot()
@@ -196,6 +199,8 @@ class _Playback:
         self._trails()
         self._camera(boxes)
         self._story()
+        if ghost is not None:
+            self.tracks += draw_ghost(ghost, self.draw_in, self.figure, self.time)
         self.draw_in.window.send(SetAnimation(self.tracks, self.duration))
 
     def _kinematics(self) -> None:
@@ -215,7 +220,7 @@ class _Playback:
 
     def _robot(self) -> None:
         for i, path in enumerate(self.draw_in.robot(self.figure)):
-            self._moving(path, self.poses[:, i, :3, 3], _quaternions(self.poses[:, i, :3, :3]))
+            self._moving(path, self.poses[:, i, :3, 3], quaternions(self.poses[:, i, :3, :3]))
 
     def _contacts(self) -> None:
         touching = [{c["frame"]: c for c in phase["contacts"]} for phase in self.phases]
@@ -295,7 +300,7 @@ class _Playback:
         }
         colours = shapes.swatch(list(moving))
         for frame, places in moving.items():
-            kept = _apart(places, 0.002 * self.draw_in.unit)
+            kept = apart(places, 0.002 * self.draw_in.unit)
             path = self.draw_in.trail(frame, places[kept], colours[frame])
             self.draw_in.tell(path, "times", floats(self.time[kept]))
 
@@ -337,7 +342,7 @@ class _Playback:
             if values is None:
                 continue
             fine = np.round(np.asarray(values, dtype=np.float64) / FINE) * FINE
-            kept = _changes(fine)
+            kept = changes(fine)
             self.tracks.append(Track(path, key, self.time[kept], fine[kept]))
 
     def _visible(self, path: str, shown: Bools) -> None:
@@ -345,38 +350,6 @@ class _Playback:
             return
         first = np.flatnonzero(np.append(True, shown[1:] != shown[:-1]))
         self.tracks.append(Track(path, "visible", self.time[first], shown[first]))
-
-
-def _pick(time: Array, phase: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Samples that are shown: about `RATE` a second, both sides of every change of phase, first and last."""
-    picture = np.floor((time - time[0]) * RATE + 1e-6)
-    change = np.diff(phase, prepend=phase[:1]) != 0
-    wanted = (np.diff(picture, prepend=-1.0) > 0) | change | np.append(change[1:], True)
-    return np.flatnonzero(wanted)
-
-
-def _changes(values: Array) -> NDArray[np.int64]:
-    """Keys (N, k) that are needed: all but those between two equal ones."""
-    still = (values[1:] == values[:-1]).all(axis=1)
-    needed = np.ones(len(values), dtype=bool)
-    needed[1:-1] = ~(still[:-1] & still[1:])
-    return np.flatnonzero(needed)
-
-
-def _apart(places: Array, step: float) -> NDArray[np.int64]:
-    """Indices of places (N, 3) at least a step [m] from the one before, and the last."""
-    kept = [0]
-    for i in range(1, len(places)):
-        if np.linalg.norm(places[i] - places[kept[-1]]) >= step:
-            kept.append(i)
-    if kept[-1] != len(places) - 1:
-        kept.append(len(places) - 1)
-    return np.array(kept)
-
-
-def _quaternions(rotations: Array) -> Array:
-    """(N, 3, 3) -> (N, 4), x y z w."""
-    return np.array([pin.Quaternion(R).coeffs() for R in rotations])
 
 
 def _holding(phases: Iterable[Mapping[str, Any]]) -> Iterable[str]:

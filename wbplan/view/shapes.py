@@ -18,6 +18,7 @@ BACKGROUND = (0.933, 0.945, 0.957)
 GREEN, AMBER, RED = 0x2A9D5C, 0xF0A020, 0xD8342C
 TOUCHING, LIFTED = 0x12836F, 0x9AA6B2
 SUPPORT = 0x2F74B5
+GHOST, FORCE = 0x3A7BD5, 0xC2417C
 WOOD, WOOD_EDGE = 0xC99A5B, 0x6E4B22
 TRAILS = (0xC2417C, 0x7A4FC0, 0xD9772B, 0x2A8FA8, 0x6B8E23, 0x8C6D5A, 0x4C6FBF, 0x9C4F4F)
 #: The red, green and blue of a frame's x, y and z axes.
@@ -47,6 +48,18 @@ def link(mesh: LinkMesh) -> Any:
         geometry,
         mc.MeshPhongMaterial(vertexColors=True, opacity=mesh.opacity, shininess=25, specular=0x222222),
     )
+
+
+def ghost(mesh: LinkMesh) -> Any:
+    """A link's triangles as of blue glass."""
+    geometry = mc.TriangularMeshGeometry(mesh.vertices, mesh.faces)
+    return mc.Mesh(geometry, mc.MeshLambertMaterial(color=GHOST, opacity=0.35, transparent=True))
+
+
+def arrow(radius: float) -> Any:
+    """An arrow from the origin to (0, 0, 1)."""
+    vertices, faces = _spike(np.zeros(3), np.array([0.0, 0.0, 1.0]), radius, pointed=True)
+    return mc.Mesh(mc.TriangularMeshGeometry(vertices, faces), flat(FORCE, 0.9))
 
 
 def sphere(radius: float, colour: Colour) -> Any:
