@@ -38,12 +38,12 @@ def script(
     robot: wb.Robot,
     *,
     box_x: float = 0.0,
-    box_y: float = 0.50,
+    box_y: float = 0.46,
     box_z: float = 0.06,
     mass: float = 0.8,
     lift: float = 0.10,
     margin: float = 0.04,
-    stride: float = 0.18,
+    stride: float = 0.16,
     friction: float = 0.7,
 ) -> wb.Script:
     """The experiment's steps (a) to (i).
@@ -104,7 +104,7 @@ def script(
         for limb, side in (("limb1", -1.0), ("limb2", 1.0)):
             inward = _pose((side * (BOX_SIZE[0] / 2 + gap), 0.0, 0.0), (0.0, 0.0, 0.0 if side < 0 else 180.0))
             path = wb.MinJerk(wb.AS_IS, box.pose * inward, seconds)
-            tasks.append(wb.PoseTask(f"{limb}_tip", path, weight=(20.0, (0.0, 10.0, 10.0))))
+            tasks.append(wb.PoseTask(f"{limb}_tip", path, weight=(200.0, (0.0, 100.0, 100.0))))
         return tasks
 
     def feet_to(places: Mapping[str, np.ndarray], seconds: float) -> list[wb.Task]:
@@ -124,7 +124,7 @@ def script(
             seconds,
             carried=[wb.Carried(box, by="limb1_tip")],
             hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
-            soft=[wb.PoseTask("box", path, weight=(100.0, 50.0)), *free_body(seconds)],
+            soft=[wb.PoseTask("box", path, weight=(400.0, 200.0)), *free_body(seconds)],
         )
 
     def beside(xyz: tuple[float, float, float], rpy_deg: tuple[float, float, float]) -> Any:
