@@ -141,12 +141,15 @@ class Stack:
         """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
+        # A base on its feet moves by the legs that it stands on: their length is its lever arm.
+        held = (t for t in self.phase.frame_targets if t.hard)
+        standing = max((reach(model, t.frame) for t in held), default=0.0)
         for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
             group = row // 3
             if not isinstance(target, FrameTarget):
                 levers.append(longest)
             elif group < len(self.rows.position_targets):
-                levers.append(max(reach(model, target.frame), reach(model, target.root)))
+                levers.append(max(standing, reach(model, target.frame), reach(model, target.root)))
             else:
                 levers.append(1.0)
         return np.array(levers)
