@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import final
 
 import numpy as np
@@ -175,3 +176,10 @@ def _group(name: str, members: Iterable[str]) -> list[str]:
 def _state(name: str, group: str, values: Mapping[str, float]) -> list[str]:
     joints = (f'    <joint name="{joint}" value="{number(value)}"/>' for joint, value in values.items())
     return [f'  <group_state name="{name}" group="{group}">', *joints, "  </group_state>"]
+
+
+def rewrite(folder: Path, files: Mapping[str, str]) -> None:
+    """Writes a robot's generated files (name -> text) into its folder, and says which."""
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+        print(f"wrote {folder / name}")

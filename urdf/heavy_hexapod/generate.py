@@ -24,7 +24,7 @@ for folder in (HERE, HERE.parent):  # this robot's modules, and the helpers that
 from heavy_links import at, body, coxa, shin, thigh  # noqa: E402
 from heavy_table import LEGS, MATERIALS, NAME, NOTE, TO_X, Drive, T  # noqa: E402
 from shapes import ORIGIN  # noqa: E402
-from writer import Joint, Link, Semantics, srdf, urdf  # noqa: E402
+from writer import Joint, Link, Semantics, rewrite, srdf, urdf  # noqa: E402
 
 UP = (0.0, -1.0, 0.0)
 
@@ -131,12 +131,5 @@ def generate() -> dict[str, str]:
     }
 
 
-def main() -> None:
-    """Rewrites both files."""
-    for name, text in generate().items():
-        (HERE / name).write_text(text, encoding="utf-8")
-        print(f"wrote {HERE / name}")
-
-
 if __name__ == "__main__":
-    main()
+    rewrite(HERE, generate())

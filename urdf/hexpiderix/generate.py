@@ -26,7 +26,7 @@ from hexpiderix_links import coxa_link, femur, thorax, tibia  # noqa: E402
 from hexpiderix_table import LEGS, MATERIALS, NAME, NOTE, T, coxa, example_angles  # noqa: E402
 from servos import AX_12A  # noqa: E402
 from shapes import Triple  # noqa: E402
-from writer import Joint, Link, Semantics, srdf, urdf  # noqa: E402
+from writer import Joint, Link, Semantics, rewrite, srdf, urdf  # noqa: E402
 
 UPPER = ("coxa", "femur")
 CORNERS = ("leg2", "leg3", "leg5", "leg6")
@@ -97,12 +97,5 @@ def generate() -> dict[str, str]:
     }
 
 
-def main() -> None:
-    """Rewrites both files."""
-    for name, text in generate().items():
-        (HERE / name).write_text(text, encoding="utf-8")
-        print(f"wrote {HERE / name}")
-
-
 if __name__ == "__main__":
-    main()
+    rewrite(HERE, generate())

@@ -23,7 +23,7 @@ from hiphant_arm import base, fore, hand, roll, shoulder, upper, wrist  # noqa: 
 from hiphant_legs import body, hip, shank, thigh  # noqa: E402
 from hiphant_table import FRONT, LEFT, LEGS, MATERIALS, NAME, NOTE, Drive, Span, T  # noqa: E402
 from shapes import ORIGIN, Triple  # noqa: E402
-from writer import Joint, Link, Semantics, srdf, urdf  # noqa: E402
+from writer import Joint, Link, Semantics, rewrite, srdf, urdf  # noqa: E402
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ARM = tuple(f"arm_joint{k}" for k in range(1, 7))
@@ -147,12 +147,5 @@ def generate() -> dict[str, str]:
     }
 
 
-def main() -> None:
-    """Rewrites both files."""
-    for name, text in generate().items():
-        (HERE / name).write_text(text, encoding="utf-8")
-        print(f"wrote {HERE / name}")
-
-
 if __name__ == "__main__":
-    main()
+    rewrite(HERE, generate())

@@ -26,7 +26,7 @@ from legarm_links import arm1, arm2, body, hip, jaw, shank, shank1, slide, thigh
 from legarm_table import ARMS, LEGS, LIMBS, MATERIALS, NAME, NOTE, T  # noqa: E402
 from servos import DRS_0101, DRS_0401  # noqa: E402
 from shapes import ORIGIN  # noqa: E402
-from writer import Joint, Link, Semantics, srdf, urdf  # noqa: E402
+from writer import Joint, Link, Semantics, rewrite, srdf, urdf  # noqa: E402
 
 
 def structure_masses(total: float, servos: float, lengths: Mapping[str, float]) -> dict[str, float]:
@@ -267,12 +267,5 @@ def generate() -> dict[str, str]:
     }
 
 
-def main() -> None:
-    """Rewrites both files."""
-    for name, text in generate().items():
-        (HERE / name).write_text(text, encoding="utf-8")
-        print(f"wrote {HERE / name}")
-
-
 if __name__ == "__main__":
-    main()
+    rewrite(HERE, generate())

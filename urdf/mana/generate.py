@@ -24,7 +24,7 @@ for folder in (HERE, HERE.parent):  # this robot's modules, and the helpers that
 from mana_links import body, hip, shank, thigh  # noqa: E402
 from mana_table import LEGS, MATERIALS, NAME, NOTE, SIDES, T  # noqa: E402
 from servos import AX_12A  # noqa: E402
-from writer import Joint, Link, Semantics, srdf, urdf  # noqa: E402
+from writer import Joint, Link, Semantics, rewrite, srdf, urdf  # noqa: E402
 
 JOINTS = ("hip1", "hip2", "knee")
 
@@ -90,12 +90,5 @@ def generate() -> dict[str, str]:
     }
 
 
-def main() -> None:
-    """Rewrites both files."""
-    for name, text in generate().items():
-        (HERE / name).write_text(text, encoding="utf-8")
-        print(f"wrote {HERE / name}")
-
-
 if __name__ == "__main__":
-    main()
+    rewrite(HERE, generate())
