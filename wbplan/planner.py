@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import signal
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -186,8 +189,28 @@ def _compile_kernels(
 
     What is wrong with the phase is said when it is planned.
     """
-    with contextlib.suppress(WbplanError):
+    with _interrupts_held(), contextlib.suppress(WbplanError):
         Loop(robot, phase, q, dt, backend=backend, placed=placed).step()
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C and SIGTERM wait until the block ends: one in the compiler's clean-up would be lost."""
+    if threading.current_thread() is not threading.main_thread():  # only that one hears signals
+        yield
+        return
+    came: list[tuple[int, FrameType | None]] = []
+    before = {
+        signum: signal.signal(signum, lambda *at: came.append(at))
+        for signum in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for signum, handler in before.items():
+            signal.signal(signum, handler)
+    if came:
+        signal.raise_signal(came[0][0])
 
 
 def _inside_limits(robot: Robot, q: Array) -> None:
