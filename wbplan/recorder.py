@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
+from wbplan.obstacles import to_record
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop, Tick
@@ -116,6 +117,7 @@ class Recorder:
                     }
                     for h in loop.compiled.held
                 ],
+                "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
             }
@@ -156,6 +158,7 @@ class Recorder:
             "dt": self._dt,
             "parameters": parameters,
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
+            "obstacles": [to_record(item) for item in self._script.obstacles],
             "phases": self._phases,
             "report": report,
         }

@@ -11,12 +11,14 @@ from typing import Any, final
 from wbplan.bodies import Body, Carried
 from wbplan.contacts import Contact
 from wbplan.errors import SpecError, listing
-from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.obstacles import Obstacle
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
 from wbplan.state import State
 from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 
-Limit = JointLimits | SupportPolygon
+Limit = JointLimits | SupportPolygon | SelfCollision | Obstacles
+LIMITS = (JointLimits, SupportPolygon, SelfCollision, Obstacles)
 
 
 def _tuple_of(items: Iterable[Any], kinds: type | tuple[type, ...], what: str) -> tuple[Any, ...]:
@@ -95,7 +97,7 @@ class Phase:
         put("carried", _tuple_of(self.carried, Carried, f"{at}.carried"))
         put("hard", _tuple_of(self.hard, Task, f"{at}.hard"))
         put("soft", _tuple_of(self.soft, Task, f"{at}.soft"))
-        put("limits", _tuple_of(self.limits, (JointLimits, SupportPolygon), f"{at}.limits"))
+        put("limits", _tuple_of(self.limits, LIMITS, f"{at}.limits"))
         put("locked", _tuple_of(self.locked, str, f"{at}.locked"))
         put("roles", _mapping(self.roles, f"{at}.roles", name_of))
         put("driven", _mapping(self.driven, f"{at}.driven", _driving))
@@ -108,7 +110,7 @@ class Phase:
         both = sorted(set(self.driven) & set(self.locked))
         if both:
             raise SpecError(f"{at}: joints both driven and locked: {', '.join(both)}")
-        for kind in (JointLimits, SupportPolygon):
+        for kind in LIMITS:
             if sum(isinstance(limit, kind) for limit in self.limits) > 1:
                 raise SpecError(f"{at}.limits: more than one {kind.__name__}")
         if any(isinstance(t, DampingTask) for t in self.hard):
@@ -129,6 +131,22 @@ class Phase:
     def joint_limits(self) -> JointLimits | None:
         """The joint limits, if the phase has them."""
         return next((limit for limit in self.limits if isinstance(limit, JointLimits)), None)
+
+    @property
+    def self_collision(self) -> SelfCollision | None:
+        """The limit that keeps the robot from itself, if the phase has it."""
+        return next((limit for limit in self.limits if isinstance(limit, SelfCollision)), None)
+
+    @property
+    def obstacles(self) -> Obstacles | None:
+        """The limit that keeps the robot from what stands in the world, if the phase has it."""
+        return next((limit for limit in self.limits if isinstance(limit, Obstacles)), None)
+
+    @property
+    def clearance(self) -> float | None:
+        """The promised distance [m], the least where there are two; `None` where the phase promises none."""
+        promised = [limit.distance for limit in (self.self_collision, self.obstacles) if limit is not None]
+        return min(promised, default=None)
 
     @property
     def loops(self) -> tuple[RelativePoseTask, ...]:
@@ -185,14 +203,30 @@ class Script:
         for body in [*_tuple_of(bodies, Body, "Script.bodies"), *(c.body for p in flat for c in p.carried)]:
             if not known.setdefault(body.name, body).same_as(body):
                 raise SpecError(f"Script: two different bodies are named '{body.name}'")
+        _one_world(flat)
         object.__setattr__(self, "phases", tuple(flat))
         object.__setattr__(self, "bodies", tuple(known.values()))
         object.__setattr__(self, "start", start)
 
     @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What stands in the world in any phase, each once."""
+        limits = (p.obstacles for p in self.phases)
+        return tuple({item.name: item for limit in limits if limit for item in limit.shapes}.values())
+
+    @property
     def duration(self) -> float:
         """Sum of the phases' durations [s]."""
         return sum(p.duration for p in self.phases)
+
+
+def _one_world(phases: Sequence[Phase]) -> None:
+    """One name, one obstacle."""
+    known: dict[str, Obstacle] = {}
+    for item in (item for phase in phases if phase.obstacles for item in phase.obstacles.shapes):
+        other = known.setdefault(item.name, item)
+        if other is not item and not other.same_as(item):
+            raise SpecError(f"Script: two different obstacles are named '{item.name}'")
 
 
 def unknown(kind: str, name: str, valid: Iterable[str]) -> SpecError:
