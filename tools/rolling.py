@@ -1,4 +1,6 @@
-"""MANA's figures 8 to 10 drawn anew: the body as prescribed, with feet as ball joints, and with feet that roll.
+"""MANA's figures 8 to 10 drawn anew: body as prescribed, with feet as ball joints, with feet that roll.
+
+Run as
 
     python tools/rolling.py [PICTURE]
 """
