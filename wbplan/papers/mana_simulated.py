@@ -27,7 +27,7 @@ row = partial(Row, "MANA")
 #: Angles are prescribed, so the servos are as good as rigid.
 STIFF = Servo(error=0.002, lag=0.002)
 STEP = 0.001  #: of the simulator [s]
-#: What "identical" and "near" mean here, place [mm] and turn [deg] of the body; the paper draws, without numbers.
+#: "Identical" and "near", for place [mm] and turn [deg] of the body; the paper draws, without numbers.
 IDENTICAL, NEAR = (0.5, 0.5), (5.0, 5.0)
 
 
