@@ -88,14 +88,15 @@ class Recorder:
         first = self._phase.index(index)
         errors = self._errors[first:]
         tasks = []
-        for task in (*phase.hard, *phase.soft):
+        level = {task: k for k, tasks in enumerate(phase.levels) for task in tasks}
+        for task in phase.tasks:
             worst = {
                 part: max(
                     (e[f"{task.label}.{part}"] for e in errors if f"{task.label}.{part}" in e), default=None
                 )
                 for part in ("position", "orientation", "joints")
             }
-            tasks.append({"name": task.label, "hard": task in phase.hard, **worst})
+            tasks.append({"name": task.label, "hard": task in phase.hard, "level": level.get(task), **worst})
         self._phases.append(
             {
                 "name": phase.name,

@@ -32,6 +32,25 @@ def _tuple_of(items: Iterable[Any], kinds: type | tuple[type, ...], what: str) -
     return result
 
 
+def _levels_of(soft: Iterable[Any], what: str) -> tuple[Any, ...]:
+    """Soft tasks as given: tasks, or levels of them."""
+    given = soft if isinstance(soft, str) or not isinstance(soft, Iterable) else tuple(soft)
+    lists = [isinstance(item, list | tuple) for item in given] if isinstance(given, tuple) else []
+    if not any(lists):
+        return _tuple_of(given, Task, what)
+    if not all(lists):
+        raise SpecError(f"{what}: expected tasks, or levels that are lists of tasks; got both")
+    levels = tuple(_tuple_of(level, Task, f"{what}[{k}]") for k, level in enumerate(given))
+    for k, level in enumerate(levels):
+        if not level:
+            raise SpecError(f"{what}[{k}]: expected one task or more in a level, got none")
+        if k < len(levels) - 1 and any(isinstance(t, DampingTask) for t in level):
+            raise SpecError(
+                f"{what}[{k}]: a damping task would forbid the levels below all motion; put it in the last"
+            )
+    return levels
+
+
 def _mapping(given: Any, what: str, convert: Callable[[Any, str], Any]) -> Mapping[str, Any]:
     """A read-only copy: name -> value, checked."""
     if not isinstance(given, Mapping):
@@ -66,7 +85,8 @@ class Phase:
         contacts: feet that stay (hard) and span the support polygon.
         carried: bodies held by frames of the robot; each is a frame that tasks may name.
         hard: tasks met in full at every tick.
-        soft: tasks met as well as their weights and everything else allow.
+        soft: tasks met as well as their weights and everything else allow; or a list of such lists: levels
+            in strict order, where a lower level never costs a higher one anything.
         limits: inequalities.
         duration: [s].
         roles: limb -> role, as the SRDF names them: the joints that the role holds are moved to its values
@@ -83,7 +103,7 @@ class Phase:
     contacts: tuple[Contact, ...] = ()
     carried: tuple[Carried, ...] = ()
     hard: tuple[Task, ...] = ()
-    soft: tuple[Task, ...] = ()
+    soft: tuple[Task, ...] | tuple[tuple[Task, ...], ...] = ()
     limits: tuple[Limit, ...] = (JointLimits(),)
     duration: float = 1.0
     roles: Mapping[str, str] = field(default_factory=dict)
@@ -96,7 +116,7 @@ class Phase:
         put("contacts", _tuple_of(self.contacts, Contact, f"{at}.contacts"))
         put("carried", _tuple_of(self.carried, Carried, f"{at}.carried"))
         put("hard", _tuple_of(self.hard, Task, f"{at}.hard"))
-        put("soft", _tuple_of(self.soft, Task, f"{at}.soft"))
+        put("soft", _levels_of(self.soft, f"{at}.soft"))
         put("limits", _tuple_of(self.limits, LIMITS, f"{at}.limits"))
         put("locked", _tuple_of(self.locked, str, f"{at}.locked"))
         put("roles", _mapping(self.roles, f"{at}.roles", name_of))
@@ -105,7 +125,7 @@ class Phase:
         put("duration", seconds)
         _unique([c.frame for c in self.contacts], f"{at}.contacts")
         _unique([c.body.name for c in self.carried], f"{at}.carried")
-        rows = [t.label for t in (*self.hard, *self.soft)] + [f"contact({c.frame})" for c in self.contacts]
+        rows = [t.label for t in self.tasks] + [f"contact({c.frame})" for c in self.contacts]
         _unique(rows, f"{at}: tasks (give name=...)")
         both = sorted(set(self.driven) & set(self.locked))
         if both:
@@ -115,6 +135,22 @@ class Phase:
                 raise SpecError(f"{at}.limits: more than one {kind.__name__}")
         if any(isinstance(t, DampingTask) for t in self.hard):
             raise SpecError(f"{at}.hard: a damping task forbids all motion; put it in soft")
+
+    @property
+    def levels(self) -> tuple[tuple[Task, ...], ...]:
+        """The soft tasks by level, the highest first; one level where `soft` is a plain list."""
+        soft: tuple[Any, ...] = self.soft
+        return soft if soft and isinstance(soft[0], tuple) else (soft,)
+
+    @property
+    def soft_tasks(self) -> tuple[Task, ...]:
+        """The soft tasks of all levels, the highest level first."""
+        return tuple(task for level in self.levels for task in level)
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """Hard, then soft tasks."""
+        return (*self.hard, *self.soft_tasks)
 
     @property
     def margin(self) -> float | None:
@@ -170,7 +206,7 @@ class Phase:
     @property
     def frame_tasks(self) -> tuple[FrameTask, ...]:
         """Hard, then soft tasks on frames."""
-        return tuple(t for t in (*self.hard, *self.soft) if isinstance(t, FrameTask))
+        return tuple(t for t in self.tasks if isinstance(t, FrameTask))
 
 
 @final
