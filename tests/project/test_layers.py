@@ -23,6 +23,7 @@ LAYERS = [
     "limits",
     "bodies",
     "script",
+    "statics",
     "compiled",
     "kinematics",
     "kernels",
