@@ -15,7 +15,8 @@ from wbplan.errors import (
     ViewError,
     WbplanError,
 )
-from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
@@ -38,6 +39,7 @@ __all__ = [
     "AS_IS",
     "Active",
     "Body",
+    "Box",
     "Bundle",
     "BundleError",
     "Carried",
@@ -46,14 +48,20 @@ __all__ = [
     "ComTask",
     "Contact",
     "Curve",
+    "Cylinder",
     "DampingTask",
+    "Ground",
+    "HeightField",
     "Hold",
     "JointLimits",
     "Line",
     "Live",
     "Loop",
+    "Mesh",
     "MinJerk",
     "ModelError",
+    "Obstacle",
+    "Obstacles",
     "OrientationTask",
     "Path",
     "Phase",
@@ -66,12 +74,15 @@ __all__ = [
     "Relaxation",
     "Robot",
     "Script",
+    "SelfCollision",
     "SolveError",
     "SpecError",
+    "Sphere",
     "State",
     "SupportPolygon",
     "Swing",
     "Task",
+    "Terrain",
     "Tick",
     "Trajectory",
     "ViewError",

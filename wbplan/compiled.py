@@ -38,6 +38,7 @@ class FrameTarget:
         position_weight, rotation_weight: (3,); a zero leaves the row out.
         gain: [1/s].
         hard: rows are equalities, weights then count only as zero or not.
+        level: of a soft one, from 0, the highest.
     """
 
     label: str
@@ -48,6 +49,7 @@ class FrameTarget:
     rotation_weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -60,6 +62,7 @@ class ComTarget:
     weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -77,6 +80,7 @@ class JointTarget:
     weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -155,10 +159,10 @@ def compile_phase(
     given = {d.joint for d in driven}
     free = np.array([*range(6), *(6 + j for j in range(model.nv - 6) if j not in given)], dtype=np.intp)
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
-    frames = _frame_targets(phase, model, state)
+    level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
+    frames = _frame_targets(phase, model, state, level)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
     polygon, region = support(phase, model, state, points)
-    tasks = (*phase.hard, *phase.soft)
     coms = tuple(
         ComTarget(
             t.label,
@@ -166,14 +170,17 @@ def compile_phase(
             t.position_weight,
             t.gain,
             t in phase.hard,
+            level.get(id(t), 0),
         )
-        for t in tasks
+        for t in phase.tasks
         if isinstance(t, ComTask)
     )
     joints = tuple(
-        _joint_target(robot, t, q, given, t in phase.hard, at) for t in tasks if isinstance(t, PostureTask)
+        _joint_target(robot, t, q, given, t in phase.hard, level.get(id(t), 0), at)
+        for t in phase.tasks
+        if isinstance(t, PostureTask)
     )
-    damping = float(sum(t.weight**2 for t in phase.soft if isinstance(t, DampingTask)))
+    damping = float(sum(t.weight**2 for t in phase.soft_tasks if isinstance(t, DampingTask)))
     return CompiledPhase(
         robot,
         phase,
@@ -310,7 +317,9 @@ def _check_feet(
                 raise SpecError(f"{at}: contact '{foot}' while {limb} changes its role ({joints} move)")
 
 
-def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget, ...]:
+def _frame_targets(
+    phase: Phase, model: Any, state: State, level: Mapping[int, int]
+) -> tuple[FrameTarget, ...]:
     """Contacts, then hard tasks, then soft ones."""
     targets = [
         FrameTarget(
@@ -344,13 +353,14 @@ def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget,
                 task.rotation_weight,
                 task.gain,
                 task in phase.hard,
+                level.get(id(task), 0),
             )
         )
     return tuple(targets)
 
 
 def _joint_target(
-    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, at: str
+    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, level: int, at: str
 ) -> JointTarget:
     """Target and weight of every joint that the task asks for and the phase leaves free."""
     what = f"{at}, {task.label}"
@@ -378,4 +388,4 @@ def _joint_target(
         weight[j] = weights.get(name, 0.0)
         path = values.get(name, Hold(goal[j]))
         paths.append((j, _bound(path, np.asarray(q[7 + j]), f"{what}.target['{name}']", (NUMBER,))))
-    return JointTarget(task.label, tuple(paths), weight, task.gain, hard)
+    return JointTarget(task.label, tuple(paths), weight, task.gain, hard, level)
