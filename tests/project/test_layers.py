@@ -27,6 +27,7 @@ LAYERS = [
     "kinematics",
     "kernels",
     "sampling",
+    "gaits",
     "rows",
     "posture",
     "stack",
