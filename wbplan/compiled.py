@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
-from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.geometry import HalfPlanes
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
 from wbplan.state import State, find_frame
+from wbplan.statics import support
 from wbplan.tasks import ComTask, DampingTask, PostureTask, check_kind
 
 Array = NDArray[np.float64]
@@ -37,6 +38,7 @@ class FrameTarget:
         position_weight, rotation_weight: (3,); a zero leaves the row out.
         gain: [1/s].
         hard: rows are equalities, weights then count only as zero or not.
+        level: of a soft one, from 0, the highest.
     """
 
     label: str
@@ -47,6 +49,7 @@ class FrameTarget:
     rotation_weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -59,6 +62,7 @@ class ComTarget:
     weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -76,6 +80,7 @@ class JointTarget:
     weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -98,7 +103,10 @@ class CompiledPhase:
         frame_targets: contacts first, then hard tasks, then soft ones.
         free: columns (nf,) of the velocity that the QP decides: the base and the free joints.
         driven: joints whose motion is given.
-        polygon: support polygon of the contacts, `None` where the phase has no such limit.
+        polygon: where the CoM may be, the hull of the contacts or their region; `None` where the phase has no
+            such limit.
+        region: whether `polygon` is the static-equilibrium region: the hull is not, unless the contacts lie
+            in one plane and nothing pushes.
         contact_points: (C, 3) [m], world.
     """
 
@@ -113,6 +121,7 @@ class CompiledPhase:
     free: NDArray[np.intp]
     driven: tuple[Driven, ...]
     polygon: HalfPlanes | None
+    region: bool
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
@@ -150,16 +159,10 @@ def compile_phase(
     given = {d.joint for d in driven}
     free = np.array([*range(6), *(6 + j for j in range(model.nv - 6) if j not in given)], dtype=np.intp)
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
-    frames = _frame_targets(phase, model, state)
+    level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
+    frames = _frame_targets(phase, model, state, level)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
-    polygon = None
-    if phase.support is not None:
-        try:
-            polygon = support_polygon(points[:, :2])
-        except SpecError as error:
-            names = ", ".join(c.frame for c in phase.contacts) or "none"
-            raise SpecError(f"{at}: its contacts ({names}) span no support polygon: {error}") from None
-    tasks = (*phase.hard, *phase.soft)
+    polygon, region = support(phase, model, state, points)
     coms = tuple(
         ComTarget(
             t.label,
@@ -167,14 +170,17 @@ def compile_phase(
             t.position_weight,
             t.gain,
             t in phase.hard,
+            level.get(id(t), 0),
         )
-        for t in tasks
+        for t in phase.tasks
         if isinstance(t, ComTask)
     )
     joints = tuple(
-        _joint_target(robot, t, q, given, t in phase.hard, at) for t in tasks if isinstance(t, PostureTask)
+        _joint_target(robot, t, q, given, t in phase.hard, level.get(id(t), 0), at)
+        for t in phase.tasks
+        if isinstance(t, PostureTask)
     )
-    damping = float(sum(t.weight**2 for t in phase.soft if isinstance(t, DampingTask)))
+    damping = float(sum(t.weight**2 for t in phase.soft_tasks if isinstance(t, DampingTask)))
     return CompiledPhase(
         robot,
         phase,
@@ -187,6 +193,7 @@ def compile_phase(
         free,
         driven,
         polygon,
+        region,
         points,
         held,
         {**now, **phase.roles},
@@ -310,7 +317,9 @@ def _check_feet(
                 raise SpecError(f"{at}: contact '{foot}' while {limb} changes its role ({joints} move)")
 
 
-def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget, ...]:
+def _frame_targets(
+    phase: Phase, model: Any, state: State, level: Mapping[int, int]
+) -> tuple[FrameTarget, ...]:
     """Contacts, then hard tasks, then soft ones."""
     targets = [
         FrameTarget(
@@ -344,13 +353,14 @@ def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget,
                 task.rotation_weight,
                 task.gain,
                 task in phase.hard,
+                level.get(id(task), 0),
             )
         )
     return tuple(targets)
 
 
 def _joint_target(
-    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, at: str
+    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, level: int, at: str
 ) -> JointTarget:
     """Target and weight of every joint that the task asks for and the phase leaves free."""
     what = f"{at}, {task.label}"
@@ -378,4 +388,4 @@ def _joint_target(
         weight[j] = weights.get(name, 0.0)
         path = values.get(name, Hold(goal[j]))
         paths.append((j, _bound(path, np.asarray(q[7 + j]), f"{what}.target['{name}']", (NUMBER,))))
-    return JointTarget(task.label, tuple(paths), weight, task.gain, hard)
+    return JointTarget(task.label, tuple(paths), weight, task.gain, hard, level)

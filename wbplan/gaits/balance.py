@@ -60,7 +60,7 @@ class Sway:
 
 
 def largest_margins(stays: Sequence[Stay], start: Array, goal: Array) -> tuple[float, Array]:
-    """The largest margin [m] that can be kept all through, and the one of each stay alone with its neighbours.
+    """The largest margin [m] that can be kept all through, and that of each stay with the next one.
 
     The supports do not change within a stay: the body may go straight from one boundary to the next, and only
     its places there are to be found (a linear program).
@@ -120,9 +120,7 @@ def sway(
     knots = np.unique(np.concatenate([np.linspace(s.begin, s.end, PIECES + 1) for s in stays]))
     times, which = _points(stays)
     places = nominal(times)
-    slack = np.concatenate(
-        [stay.polygon.margins(places[which == k]) for k, stay in enumerate(stays)]
-    )
+    slack = np.concatenate([stay.polygon.margins(places[which == k]) for k, stay in enumerate(stays)])
     if slack.min() >= margin + SPARE:
         return Sway(nominal, None, _least(slack, which))
     full = np.concatenate([[knots[0]] * 3, knots, [knots[-1]] * 3])

@@ -39,17 +39,17 @@ class Stand:
 class Gait:
     """A cycle of steps; in each one some legs swing and the others carry.
 
-    Two lengths are told apart: the *stride* is how far the body goes in a cycle, the *stroke* s how far a foot
-    goes in the body's frame while it stands. With T the cycle, n legs of which u stand on average (duty
-    factor beta = u/n), each swinging once in a cycle, the speed is v = stride / T = s / (beta T) = s n / (T u).
+    Two lengths are told apart: the *stride* is how far the body goes in a cycle, the *stroke* s how far a
+    foot goes in the body's frame while it stands. With T the cycle and n legs of which u stand on average
+    (duty factor beta = u/n), each swinging once, the speed is v = stride / T = s / (beta T) = s n / (T u).
 
     Args:
         name: for reports.
         steps: the legs that swing in each step; an empty one is a pause on all feet.
         legs: all legs, in their order round the body; those that swing, as they come, where not given.
         lasting: time of each step against the others'; all alike where not given.
-        advance: share of the stride that the body goes in each step, 1 in all; in proportion to time where not
-            given.
+        advance: share of the stride that the body goes in each step, 1 in all; in proportion to time where
+            not given.
 
     Raises:
         SpecError: a leg never swings, is not one of the legs, or swings in two steps running.
@@ -176,13 +176,15 @@ def _check_swings(
         raise SpecError(f"{at}: {listing(strange)} swings but is none of its legs: {listing(legs)}")
     never = [leg for leg in legs if leg not in swinging]
     if never:
-        raise SpecError(f"{at}: {listing(never)} never swings; every leg has to, or the body leaves it behind")
+        raise SpecError(
+            f"{at}: {listing(never)} never swings; every leg has to, or the body leaves it behind"
+        )
     for k, step in enumerate(steps):
         again = sorted(set(step) & set(steps[k - 1])) if len(steps) > 1 else step
         if again:
             raise SpecError(
-                f"{at}: {', '.join(again)} swings in step {(k - 1) % len(steps) + 1} and in step {k + 1}; it has "
-                "to stand between two swings"
+                f"{at}: {', '.join(again)} swings in step {(k - 1) % len(steps) + 1} and in step {k + 1}; "
+                "it has to stand between two swings"
             )
 
 

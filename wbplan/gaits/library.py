@@ -18,7 +18,7 @@ def tripod(legs: Legs) -> Gait:
     Args:
         legs: six or another even number of legs, in their order round the body.
     """
-    _count(legs, "tripod", [n for n in range(6, 40, 2)], "an even number of legs, six or more")
+    _count(legs, "tripod", range(6, 40, 2), "an even number of legs, six or more")
     return Gait("tripod", (tuple(legs[0::2]), tuple(legs[1::2])), tuple(legs))
 
 
@@ -57,7 +57,7 @@ def quadrangular(legs: Legs) -> tuple[Gait, ...]:
     """
     _count(legs, "quadrangular", [6], "six legs")
     pairs = [(a, b) for a, b in product(range(3), range(3, 6)) if (b - a) % 6 not in (1, 5)]
-    found = []
+    found: list[Gait] = []
     for triple in permutations(pairs, 3):
         if len({k for pair in triple for k in pair}) == 6:
             steps = tuple((legs[a], legs[b]) for a, b in triple)

@@ -48,9 +48,7 @@ def regular_stance(legs: Sequence[str], radius: float = 1.0, first: float = 0.0)
         first: direction of the first one [rad].
     """
     angles = first + 2.0 * np.pi * np.arange(len(legs)) / len(legs)
-    return {
-        leg: radius * np.array([np.cos(a), np.sin(a)]) for leg, a in zip(legs, angles, strict=True)
-    }
+    return {leg: radius * np.array([np.cos(a), np.sin(a)]) for leg, a in zip(legs, angles, strict=True)}
 
 
 def step_margins(
@@ -118,7 +116,8 @@ def best_margin(
     In a step the support does not change, so that a body on a straight line between points inside it stays
     inside: with c_k the body where step k begins,
 
-        max m  over c_1 .. c_n, m   with   N_k c_k <= d_k - m,  N_k c_(k+1) <= d_k - m,  c_(n+1) = c_1 + travel
+        max m   over c_1 .. c_n and m
+        with    N_k c_k <= d_k - m,   N_k c_(k+1) <= d_k - m,   c_(n+1) = c_1 + travel
 
     which is a linear program.
 
@@ -163,7 +162,9 @@ def possible(
     return best_margin(gait, stance, travel, straight=straight) > margin + 1e-9
 
 
-def require(gait: Gait, stance: Mapping[str, ArrayLike], margin: float, travel: ArrayLike = (0.0, 0.0)) -> None:
+def require(
+    gait: Gait, stance: Mapping[str, ArrayLike], margin: float, travel: ArrayLike = (0.0, 0.0)
+) -> None:
     """Refuse a gait that cannot be held with a margin.
 
     Args:

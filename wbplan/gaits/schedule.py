@@ -1,4 +1,4 @@
-"""From beats and a track to footholds: when each foot lifts, where it lands, and where the body is meanwhile."""
+"""From beats and a track to footholds: when each foot lifts, where it lands, where the body is meanwhile."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Course:
         return float(self.way(min(max(t, 0.0), self.duration)))
 
     def place(self, t: float) -> Array:
-        """x [m], y [m], yaw [rad] at a time."""
+        """X [m], y [m], yaw [rad] at a time."""
         return self.track.place(self.gone(t))
 
     def places(self, times: Array) -> Array:
@@ -167,7 +167,9 @@ def count_for(gait: Gait, distance: float, stride: float) -> int:
     count = gait.step_count
     while True:
         beats = beats_of(gait, count)
-        if beats[-1].swing and distance / _time_at_speed(beats, gait.legs) <= stride / gait.step_count * (1 + 1e-9):
+        if beats[-1].swing and distance / _time_at_speed(beats, gait.legs) <= stride / gait.step_count * (
+            1 + 1e-9
+        ):
             return count
         count += 1
 
@@ -200,7 +202,9 @@ def _paced(beats: Sequence[Beat], up: float, down: float, fine: int = 16) -> tup
     ends = np.cumsum([beat.lasting for beat in beats])
     begins = np.concatenate([[0.0], ends[:-1]])
     level = len({round(beat.pace, 9) for beat in beats}) == 1
-    times = np.unique(np.concatenate([np.linspace(b, e, fine + 1) for b, e in zip(begins, ends, strict=True)]))
+    times = np.unique(
+        np.concatenate([np.linspace(b, e, fine + 1) for b, e in zip(begins, ends, strict=True)])
+    )
     if level:
         pace = np.full(len(times), beats[0].pace)
     else:  # each step goes its own way: cubics join the speeds at its ends, means of both paces
@@ -230,8 +234,8 @@ def course_of(
 ) -> Course:
     """The body along a track, at rest at both ends, its speed as smooth as the beats' pace allows.
 
-    It speeds up until every foot has stepped once, and slows down from where the first one has stepped for the
-    last time. There is a longer time for both where the track would be gone too soon at the speed asked.
+    It speeds up until every foot has stepped once, and slows down from where the first one has stepped for
+    the last time. Both take longer where the track would be gone too soon at the speed asked.
 
     Args:
         beats: the steps.

@@ -28,8 +28,8 @@ class Mode:
 
     Attributes:
         name: of the mode.
-        lean: initial angle of the abductors [rad], between the four outer legs and the x axis: 0 has them parallel
-            to it; None leaves the legs as in the pose.
+        lean: initial angle of the abductors [rad], between the four outer legs and the x axis: 0 has them
+            parallel to it; None leaves the legs as in the pose.
         heading: of travel against the body's x axis [rad].
     """
 
@@ -112,7 +112,8 @@ class Walker:
         object.__setattr__(self, "state", self.robot.state(self.pose))
         if len(self.legs) < 3:
             raise SpecError(
-                f"robot '{self.robot.name}' has {len(self.legs)} feet in pose '{self.pose}'; walking needs three or more"
+                f"robot '{self.robot.name}' has {len(self.legs)} feet in pose '{self.pose}'; "
+                "walking needs three or more"
             )
 
     @property
@@ -155,8 +156,8 @@ class Walker:
     def _leg(self, leg: str) -> ThreeJointLeg:
         if leg not in self.closed:
             raise SpecError(
-                f"robot '{self.robot.name}': leg '{leg}' has no closed form; expected three joints, the last two "
-                "parallel and square to the first"
+                f"robot '{self.robot.name}': leg '{leg}' has no closed form; expected three joints, the last "
+                "two parallel and square to the first"
             )
         return self.closed[leg]
 
@@ -185,7 +186,9 @@ class Walker:
         if lean is not None:
             feet = {leg: self._leaning(leg, foot, lean) for leg, foot in feet.items()}
         if radius is not None or angles:
-            circle = radius if radius is not None else float(np.mean([np.linalg.norm(f) for f in feet.values()]))
+            circle = (
+                radius if radius is not None else float(np.mean([np.linalg.norm(f) for f in feet.values()]))
+            )
             turned = {leg: math.atan2(f[1], f[0]) for leg, f in feet.items()} | dict(angles or {})
             feet = {leg: circle * np.array([math.cos(a), math.sin(a)]) for leg, a in turned.items()}
         ground = self.state.pose(self.robot.feet[self.legs[0]]).translation[2]

@@ -74,11 +74,11 @@ class _Swing(Path):
 @final
 @dataclass(frozen=True, eq=False)
 class QuinticSwing(_Swing):
-    """Up, across and down by quintics; speed and acceleration are zero at lift-off, apex (up and down) and touch-down.
+    """Up, across and down by quintics, without a jump of speed or acceleration.
 
-    With m the law 10 s^3 - 15 s^4 + 6 s^5 and T the duration: z rises by m(2t/T) to the apex, `height` above
-    the higher end, and comes down alike; x and y go by m((t/T - e)/(1 - 2e)), so that the foot leaves and meets
-    the ground upright where e > 0.
+    With m the law 10 s^3 - 15 s^4 + 6 s^5 and T the duration: z rises by m(2t/T) to the apex, `height`
+    above the higher end, and comes down alike; x and y go by m((t/T - e)/(1 - 2e)), so that the foot leaves
+    and meets the ground upright where e > 0.
 
     Args:
         start: (3,) [m].
@@ -118,10 +118,10 @@ class CosineSwing(_Swing):
     """Zhuang's swing (equations 20 to 22), corrected so that position is continuous.
 
     With t1 the time of the first lift h, t2 = T - t1 and c(t) = cos(pi (t + t2 - 2 t1)/(t2 - t1)):
-    the foot rises straight up by h in t1; then x = start + (goal - start)(1 + c)/2 while z makes a cosine bump
-    up to `height` above the start; then it sinks straight down from t2 on (printed: -v t for -v (t - t2)). Where the
-    goal is at another height, the bump's two halves end at their own levels. The vertical speed still
-    jumps at lift-off, t1, t2 and touch-down, as in print; `smooth` replaces the straight pieces by quintics, which
+    the foot rises straight up by h in t1; then x = start + (goal - start)(1 + c)/2 while z makes a cosine
+    bump up to `height`; then it sinks straight down from t2 on (printed: -v t for -v (t - t2)). Where the
+    goal is at another height, the bump's two halves end at their own levels. The vertical speed still jumps
+    at lift-off, t1, t2 and touch-down, as in print; `smooth` replaces the straight pieces by quintics, which
     leaves no jump of speed.
 
     Args:

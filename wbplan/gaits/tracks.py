@@ -32,14 +32,16 @@ class Track:
     curve: Callable[[float], tuple[float, float, float]]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "length", number(self.length, "Track.length", "a length of 0 or more", least=0.0))
+        object.__setattr__(
+            self, "length", number(self.length, "Track.length", "a length of 0 or more", least=0.0)
+        )
         for way in (0.0, self.length):
             place = np.asarray(self.curve(way), dtype=np.float64)
             if place.shape != (3,) or not np.isfinite(place).all():
                 raise SpecError(f"Track.curve({way:g}): expected x, y and yaw, got {place}")
 
     def place(self, way: float) -> Array:
-        """x [m], y [m] and yaw [rad] after `way` [m], held at both ends."""
+        """X [m], y [m] and yaw [rad] after `way` [m], held at both ends."""
         return np.asarray(self.curve(min(max(way, 0.0), self.length)), dtype=np.float64)
 
     def pose(self, way: float) -> pin.SE3:
@@ -128,5 +130,3 @@ def through(points: ArrayLike, *, follow: bool = True) -> Track:
 
 def _angle(value: float, what: str) -> float:
     return number(value, what, "a finite angle [rad]")
-
-

@@ -216,7 +216,9 @@ def build(
     robot = walker.robot
     first = made.steps[0]
     feet = {**first.support, **{limb: ends[0] for limb, ends in first.swing.items()}}
-    start = walker.stand(stance, {leg: float(foot[2]) for leg, foot in feet.items()}, _mean_height(feet) * manner.follow)
+    start = walker.stand(
+        stance, {leg: float(foot[2]) for leg, foot in feet.items()}, _mean_height(feet) * manner.follow
+    )
     steps = _with_ends(made, feet, manner)
     offset = (start.com - start.q[:3])[:2]
     lead = manner.settle
@@ -250,7 +252,9 @@ def build(
                 weight=((0.0, 0.0, 100.0), 50.0),
             ),
         ]
-        phases.append(_phase(walker, step, body, margin, manner, ground, dict(fields(step)) if fields else {}))
+        phases.append(
+            _phase(walker, step, body, margin, manner, ground, dict(fields(step)) if fields else {})
+        )
     return Walk(robot, start, made, tuple(phases), com, margin)
 
 
@@ -265,16 +269,17 @@ def _phase(
 ) -> Phase:
     robot = walker.robot
     swings = [
-        PositionTask(robot.feet[limb], _swing(limb, ends, step, manner, ground)) for limb, ends in step.swing.items()
+        PositionTask(robot.feet[limb], _swing(limb, ends, step, manner, ground))
+        for limb, ends in step.swing.items()
     ]
     legs = {joint for limb in walker.legs for joint in robot.limbs[limb]}
     others = tuple(joint for joint in robot.joint_names if joint not in legs)
     rest = [PostureTask(walker.state, joints=others, weight=1.0)] if others else []
     return Phase(
         step.name,
-        contacts=[Contact(robot.feet[limb], friction=manner.friction) for limb in step.support],
-        hard=[*swings, *more.pop("hard", ())],
-        soft=[*more.pop("soft", rest), *body],
+        contacts=tuple(Contact(robot.feet[limb], friction=manner.friction) for limb in step.support),
+        hard=(*swings, *more.pop("hard", ())),
+        soft=(*more.pop("soft", rest), *body),
         limits=more.pop("limits", [JointLimits(speed=manner.speed), SupportPolygon(margin=margin)]),
         duration=step.duration,
         **more,
@@ -289,7 +294,9 @@ def _swing(limb: str, ends: Array, step: Step, manner: Manner, ground: Ground) -
         path = manner.swing(ends[0], ends[1], height, step.duration)
         points = path.points(times)
         above = points[:, 2] - np.array([ground(float(x), float(y)) for x, y in points[:, :2]])
-        asked = np.where((times > 0.25 * step.duration) & (times < 0.75 * step.duration), manner.clearance, 0.0)
+        asked = np.where(
+            (times > 0.25 * step.duration) & (times < 0.75 * step.duration), manner.clearance, 0.0
+        )
         short = float((asked - above).max())
         if short <= 1e-9:
             return path
@@ -314,7 +321,7 @@ def _with_ends(made: Schedule, feet: Mapping[str, Array], manner: Manner) -> tup
 
 
 def _heights(steps: Sequence[Step], height: float, follow: float) -> PchipInterpolator:
-    """Height of the body's origin over time: its share of the mean height of the footholds at each boundary."""
+    """Height of the body over time: at each boundary its share of the mean height of the footholds."""
     times, values = [], []
     for step in steps:
         feet = [*step.support.values(), *(ends[0] for ends in step.swing.values())]
@@ -342,12 +349,14 @@ def _balanced(
     largest, common = largest_margins(stays, ends[0], ends[1])
     margin = USUAL * largest if manner.margin is None else manner.margin
     worst = int(np.argmin(common))
-    found = sway(stays, nominal, margin, manner.step_time / 2.0) if 0.0 < largest and margin <= largest else None
+    found = (
+        sway(stays, nominal, margin, manner.step_time / 2.0) if largest > 0.0 and margin <= largest else None
+    )
     if found is None:
         asked = "some margin" if manner.margin is None else f"a margin of {manner.margin:.4f} m"
         raise GaitError(
-            f"step '{steps[worst].name}': the body cannot be held with {asked}: the largest there is from this "
-            f"step to the next is {common[worst]:.4f} m, {largest:.4f} m all through",
+            f"step '{steps[worst].name}': the body cannot be held with {asked}: the largest there is from "
+            f"this step to the next is {common[worst]:.4f} m, {largest:.4f} m all through",
             step=max(worst - 1, 0),
             margin=float(min(largest, common[worst])),
         )
@@ -380,6 +389,7 @@ def _reach(
                 found = walker.closed[limb].solve(body.actInv(foot)) if limb in walker.closed else None
                 if found is not None and not found.within:
                     raise GaitError(
-                        f"step '{step.name}', at {t:.2f} s: '{limb}' cannot reach its foothold: {found.reason}",
+                        f"step '{step.name}', at {t:.2f} s: '{limb}' cannot reach its foothold: "
+                        f"{found.reason}",
                         step=max(k - 1, 0),
                     )
