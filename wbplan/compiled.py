@@ -5,14 +5,14 @@ Nothing here is a matrix: both backends start from this.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.bodies import Held, frame_number, with_carried
+from wbplan.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
@@ -108,6 +108,7 @@ class CompiledPhase:
         region: whether `polygon` is the static-equilibrium region: the hull is not, unless the contacts lie
             in one plane and nothing pushes.
         contact_points: (C, 3) [m], world.
+        standing: bodies that stand in the world and are not carried, each with its pose.
     """
 
     robot: Robot
@@ -125,6 +126,7 @@ class CompiledPhase:
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
+    standing: tuple[tuple[Body, Any], ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -138,6 +140,7 @@ def compile_phase(
     q: Array,
     placed: Mapping[str, Any] | None = None,
     roles: Mapping[str, str | None] | None = None,
+    bodies: Sequence[Body] = (),
 ) -> CompiledPhase:
     """Look up every name of a phase and bind its targets to a start configuration.
 
@@ -147,6 +150,7 @@ def compile_phase(
         q: (nq,) configuration at the phase's start.
         placed: pose in the world of every body that stands somewhere, by name.
         roles: the role that each limb is in; by default read off `q`.
+        bodies: the script's; those in `placed` that are not carried stand in the way.
 
     Raises:
         SpecError: a name does not exist, or two parts of the phase do not fit.
@@ -197,6 +201,7 @@ def compile_phase(
         points,
         held,
         {**now, **phase.roles},
+        standing(phase.carried, placed or {}, bodies),
     )
 
 

@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan import kernels
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
-from wbplan.kinematics import Kinematics
+from wbplan.collision import CAPACITY, Clearance, collision_model
+from wbplan.compiled import CompiledPhase, FrameTarget
+from wbplan.kinematics import Kinematics, reach
 from wbplan.paths import number
 from wbplan.posture import Posture
 from wbplan.rows import Rows
@@ -39,17 +40,6 @@ MARGIN_RESERVE = 1e-4
 
 #: Stands for no bound in the QP.
 UNBOUNDED = 1e20
-
-
-def reach(model: Any, frame: int) -> float:
-    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
-    if frame == WORLD:
-        return 0.0
-    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [
-        model.frames[frame].placement.translation
-    ]
-    return float(sum(np.linalg.norm(link) for link in links))
 
 
 @final
@@ -84,6 +74,7 @@ class Stack:
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
         damping: what stands on the whole diagonal of H, at the last `assemble`.
         blocks: what the rows of C are.
+        clearance: distances between links, bodies and obstacles; None where the phase promises none.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
@@ -103,6 +94,7 @@ class Stack:
         self._soft_rows()
         self._joint_box()
         self._polygon()
+        self._clearance()
 
     def _hard_rows(self) -> None:
         rows, nf = self.rows, len(self.free)
@@ -197,6 +189,19 @@ class Stack:
         self.blocks: list[RowBlock] = []
         if edges:
             self.blocks.append(RowBlock("margin", "m", slice(0, edges), lambda: self.edge_names))
+        self._edges = (self.C, self.d)
+
+    def _clearance(self) -> None:
+        """Rows below the polygon's, as many at every tick."""
+        self.clearance: Clearance | None = None
+        if self.phase.phase.clearance is None:
+            return
+        self.clearance = Clearance(collision_model(self.phase), self.kinematics, self.dt)
+        edges, nf = len(self.d), len(self.free)
+        self.C, self.d = np.zeros((edges + CAPACITY, nf)), np.full(edges + CAPACITY, UNBOUNDED)
+        self._edges, near = (self.C[:edges], self.d[:edges]), slice(edges, edges + CAPACITY)
+        self._near = (self.free, self.driven, self.driven_step, self.C[near], self.d[near], UNBOUNDED)
+        self.blocks.append(RowBlock("clearance", "m", near, self.clearance.keep_names))
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -231,6 +236,8 @@ class Stack:
         """Kinematics, errors and margin at `q` for the targets as they stand now."""
         rows = self.rows
         self.kinematics.update(q)
+        if self.clearance is not None:
+            self.clearance.measure()
         self.drift, self.margin = rows.measure(self.kinematics, self._normals, self._offsets)
         self.hard_error[: rows.hard] = rows.error[: rows.hard]
         for i, (joint, _, _) in enumerate(self.hard_joints):
@@ -258,12 +265,14 @@ class Stack:
         support = self.phase.phase.support
         if support is not None:
             self._fill_polygon(support.margin, -support.recovery_speed * self.dt)
+        if self.clearance is not None:
+            self.clearance.write(kin.jacobian, *self._near)
 
     def _fill_polygon(self, margin: float, least: float) -> None:
         kin = self.kinematics
         kernels.polygon(
             self._normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
-            margin + MARGIN_RESERVE, least, self.C, self.d,
+            margin + MARGIN_RESERVE, least, *self._edges,
         )  # fmt: skip
 
     def distances(self) -> Array:
@@ -297,6 +306,8 @@ class Stack:
         support = self.phase.phase.support
         if support is not None:
             self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
+        if self.clearance is not None:
+            self.clearance.linearise(kin.jacobian, *self._near)
         self.driven_step[:] = given
 
     def reach(self, column: int) -> float:

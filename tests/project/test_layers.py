@@ -27,6 +27,7 @@ LAYERS = [
     "statics",
     "compiled",
     "kinematics",
+    "collision",
     "kernels",
     "sampling",
     "gaits",

@@ -2,8 +2,8 @@
 
     n' (J_b - J_a) dq >= -share (d - distance)
 
-with d the distance of a pair [m], n the unit normal from a to b, and J_a, J_b the Jacobians of the points of a
-and b that are nearest. Of two convex bodies that do not touch, n turns without a jump, while the nearest
+with d the distance of a pair [m], n the unit normal from a to b, and J_a, J_b the Jacobians of the points of
+a and b that are nearest. Of two convex bodies that do not touch, n turns without a jump, while the nearest
 points of parallel edges or faces leap from one end to the other. Points that were nearest a while ago are
 therefore remembered, up to four a pair, each with a row of its own: a plank coming down flat is held at both
 its ends.
@@ -28,6 +28,7 @@ from wbplan.collision.model import CollisionModel
 from wbplan.kinematics import Kinematics
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: Rows of a compiled phase; with more points near, the nearest have one.
 CAPACITY = 48
@@ -40,6 +41,9 @@ SHARE = 0.5
 
 #: The tick stays this far [m] outside the promised distance: its rows are linear, the links' paths are not.
 RESERVE = 1e-4
+
+#: Tolerance [m] of the distances.
+PRECISE = 1e-9
 
 #: Speed [m/s] at which a pair that is too near is moved apart.
 RECOVERY = 0.05
@@ -62,6 +66,7 @@ class Clearance:
         self._data = model.geometry.createData()
         for request in self._data.distanceRequests:
             request.gjk_initial_guess = coal.GJKInitialGuess.CachedGuess
+            request.gjk_tolerance = PRECISE
         self._fields = [Field(item) for item in model.fields]
         self._shapes()
         self._pairs()
@@ -72,7 +77,7 @@ class Clearance:
     def _shapes(self) -> None:
         objects, places = list(self.model.geometry.geometryObjects), self._data.oMg
         count, padded = len(objects), len(self.model.things)
-        # Pinocchio keeps the shapes' poses in one piece of memory: two views of it spare 2 x 76 objects a tick.
+        # Pinocchio keeps the shapes' poses in one piece of memory: two views of it spare many objects a tick.
         gap = places[1].translation.__array_interface__["data"][0] if count > 1 else 0
         gap -= places[0].translation.__array_interface__["data"][0] if count > 1 else 0
         stride = np.lib.stride_tricks.as_strided
@@ -117,6 +122,8 @@ class Clearance:
         self._allowed = np.zeros(len(model.first))
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._results = [self._data.distanceResults[k] for k in range(solid)]
+        self._nearest = self._results_view() if solid > 1 else None
+        self._still: list[tuple[int, float]] | None = None
 
     def _slots(self) -> None:
         n = CAPACITY
@@ -140,15 +147,31 @@ class Clearance:
             self._rotations, self._middles, self._half, self._radius, self._plane, first, second, influence,
             self._found,
         )  # fmt: skip
-        self.spare[:] = np.inf
-        self._count = 0
-        for p in self._found[:near].tolist():
+        self._count = min(near, MEASURED)
+        found = self._found[: self._count]
+        for p in found.tolist():
             pin.computeDistance(model.geometry, self._data, p)
-            self._note(p, p, self._results[p])
+        if self._nearest is None:
+            copied = [(r.normal, r.getNearestPoint1(), r.getNearestPoint2()) for r in self._results]
+            nearest = np.array(copied).reshape(-1, 9)
+        else:
+            nearest = self._nearest
+        self.spare[:] = np.inf
+        kernels.gather(
+            nearest,
+            found,
+            model.bound,
+            self._keys,
+            self._of,
+            self._distance,
+            self._normal,
+            self._points,
+            self.spare,
+        )
         for p, shape, field in self._on_fields:
             self._measure_field(p, shape, self._fields[field], field)
         self.checked = self._count
-        count = min(self._count, MEASURED)
+        count = self._count
         if self._places_all is not self._places:
             self._places_all[: len(self._places)] = self._places
             self._rotations_all[: len(self._places)] = self._rotations
@@ -158,8 +181,9 @@ class Clearance:
             *self._local, *self._world, self._towards, self._gap,
         )  # fmt: skip
         self.active = int((self._key >= 0).sum())
-        promised = self.spare[model.promised] + model.bound[model.promised]
-        self.least = float(promised.min(initial=np.inf))
+        if self._still is None:
+            self._still = self._measure_still()
+        self.least = min(kernels.least(self.spare, model.bound, model.promised), self._still_least)
 
     def _note(self, key: int, pair: int, result: Any) -> None:
         """One measured distance; the spare of a pair is that of its nearest points."""
@@ -170,6 +194,36 @@ class Clearance:
             self._normal[k] = result.normal
             self._points[0, k], self._points[1, k] = result.getNearestPoint1(), result.getNearestPoint2()
             self._count = k + 1
+
+    def _measure_still(self) -> list[tuple[int, float]]:
+        """Number and distance of every pair that does not move, once and for all."""
+        objects, found = self.model.geometry.geometryObjects, []
+        self._still_least = np.inf
+        poses = [coal.Transform3s(M.rotation, M.translation) for M in self._data.oMg]
+        for k, (a, b, _, promised) in enumerate(self.model.still):
+            self._result.clear()
+            coal.distance(
+                objects[a].geometry, poses[a], objects[b].geometry, poses[b], self._request, self._result
+            )
+            distance = float(self._result.min_distance)
+            found.append((k, distance))
+            if promised:
+                self._still_least = min(self._still_least, distance)
+        return found
+
+    def _results_view(self) -> Array | None:
+        """(P, 9) normal and nearest points of every pair, in coal's own memory: no objects are made of them.
+
+        None where another version of coal keeps them elsewhere.
+        """
+        pin.computeDistance(self.model.geometry, self._data, 0)
+        first, second = (self._results[k].normal.__array_interface__["data"][0] for k in (0, 1))
+        view = np.lib.stride_tricks.as_strided(
+            self._results[0].normal, (len(self._results), 9), (second - first, 8)
+        )
+        result = self._results[0]
+        told = np.concatenate([result.normal, result.getNearestPoint1(), result.getNearestPoint2()])
+        return view if np.array_equal(view[0], told, equal_nan=True) else None
 
     def _measure_field(self, pair: int, shape: int, field: Field, number: int) -> None:
         item, reach = self.model.geometry.geometryObjects[shape], float(self.model.influence[pair])
@@ -189,9 +243,11 @@ class Clearance:
 
     def kept(self) -> bool:
         """Whether every pair keeps its distance, or was nearer before and is no nearer now."""
-        return bool((self.spare >= self._allowed - 1e-9).all())
+        return bool(kernels.all_kept(self.spare, self._allowed))
 
-    def write(self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float) -> None:
+    def write(
+        self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float
+    ) -> None:
         """The rows C x <= d of the next step, x over the free columns; `nothing` in d for unused rows."""
         least = np.full(len(self.spare), -RECOVERY * self._dt)
         self._fill(jacobian, free, driven, step, C, d, nothing, SHARE, least)
@@ -218,7 +274,7 @@ class Clearance:
         """The rows' names at this moment, to be worked out whenever somebody asks."""
         return partial(self._named, self._key.copy(), self._pair.copy())
 
-    def _named(self, key: Array, pair: Array) -> list[str]:
+    def _named(self, key: Ints, pair: Ints) -> list[str]:
         return [
             f"clearance {self.model.name(int(p))}" if k >= 0 else "" for k, p in zip(key, pair, strict=True)
         ]
@@ -231,11 +287,18 @@ class Clearance:
 
     def broken(self) -> list[tuple[str, float, float]]:
         """Names, distance [m] and promised distance [m] of pairs nearer than promised, the worst first."""
-        at = np.flatnonzero((self.spare < -1e-9) & self.model.promised)
-        at = at[np.argsort(self.spare[at])]
-        return [
-            (self.model.name(p), float(self.spare[p] + self.model.bound[p]), float(self.model.bound[p])) for p in at
-        ]
+        model, things = self.model, self.model.things
+        near = np.flatnonzero((self.spare < -1e-9) & model.promised)
+        found = [(model.name(p), float(self.spare[p] + model.bound[p]), float(model.bound[p])) for p in near]
+        for k, distance in self._still or ():
+            a, b, bound, promised = model.still[k]
+            if promised and distance < bound - 1e-9:
+                found.append((f"{things[a].name} - {things[b].name}", distance, bound))
+        worst: dict[str, tuple[str, float, float]] = {}
+        for item in found:
+            if item[0] not in worst or item[1] < worst[item[0]][1]:
+                worst[item[0]] = item
+        return sorted(worst.values(), key=lambda item: item[1] - item[2])
 
     def nearest(self) -> tuple[str, float, Array, Array] | None:
         """The nearest pair that is measured: names, distance [m], and its points (3,) in the world."""

@@ -99,6 +99,43 @@ def near(
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
+def gather(
+    nearest: Any, found: Any, bound: Any, keys: Any, pairs: Any, distance: Any, normal: Any, points: Any,
+    spare: Any,
+) -> None:  # fmt: skip
+    """Takes the results (P, 9), normal and points, of the pairs that were found."""
+    for k in range(found.shape[0]):
+        p = found[k]
+        keys[k] = pairs[k] = p
+        gap = 0.0
+        for i in range(3):
+            normal[k, i] = nearest[p, i]
+            points[0, k, i], points[1, k, i] = nearest[p, 3 + i], nearest[p, 6 + i]
+            gap += nearest[p, i] * (nearest[p, 6 + i] - nearest[p, 3 + i])
+        distance[k] = gap
+        spare[p] = gap - bound[p]
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def least(spare: Any, bound: Any, promised: Any) -> float:
+    """The least distance of the pairs that promise one."""
+    found = np.inf
+    for p in range(spare.shape[0]):
+        if promised[p]:
+            found = min(found, spare[p] + bound[p])
+    return found
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def all_kept(spare: Any, allowed: Any) -> bool:
+    """Whether no pair is nearer than its bound, or than it was: to a micrometre, the distances' noise."""
+    for p in range(spare.shape[0]):
+        if not spare[p] >= (allowed[p] - 1e-6 if allowed[p] < 0.0 else -1e-9):
+            return False
+    return True
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _to_world(rotations: Any, places: Any, g: int, local: Any, out: Any) -> None:
     for i in range(3):
         value = places[g, i]
@@ -128,9 +165,8 @@ def remember(
     face each other. The gap of remembered points along the pair's normal of today is never less than the
     pair's distance, so a slot never asks for more than its pair does.
 
-    Args:
-        count: how many were found; keys, pairs, distance, normal, on_first, on_second: what was found.
-        key, pair, local_a, local_b, world_a, world_b, towards, gap: the slots; key is -1 where one is free.
+    Of what was found: `count`, `keys`, `pairs`, `distance`, `normal`, `on_first`, `on_second`. Of the slots:
+    `key` (-1 where one is free), `pair`, `local_a`, `local_b`, `world_a`, `world_b`, `towards`, `gap`.
     """
     point = np.zeros(3)
     for s in range(key.shape[0]):
@@ -205,10 +241,9 @@ def fill(
 ) -> None:  # fmt: skip
     """C and d of n' (J_a - J_b) x <= share (gap - bound) for every slot; `nothing` in d where one is free.
 
-    Args:
-        jacobian: (6, nv), Pinocchio's: spatial velocity at the world's origin, linear rows first.
-        moves: (joints, nv), 1 where a column moves a joint.
-        least: (P,) d of a pair that is nearer than its bound is not below this [m].
+    `jacobian` (6, nv) is Pinocchio's, the spatial velocity at the world's origin, linear rows first; `moves`
+    (joints, nv) is 1 where a column moves a joint; d of a pair that is nearer than its bound is not below
+    `least` (P,) [m].
     """
     for s in range(key.shape[0]):
         if key[s] < 0:

@@ -9,7 +9,8 @@ Of every two shapes on different joints a pair is made, less:
 - feet in contact, and obstacles.
 
 Feet that are not in contact, and frames of `Obstacles.except_for`, may touch obstacles but not go in by more
-than `TOUCH`. All other pairs keep the promised distance.
+than `TOUCH`; pairs of `SelfCollision.except_for` may touch. All other pairs keep the promised distance.
+What does not move in the phase relative to each other is measured once.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from wbplan.compiled import CompiledPhase
 from wbplan.errors import SpecError
+from wbplan.limits import SelfCollision
 from wbplan.obstacles import Box, Cylinder, HeightField, Mesh, Obstacle, Sphere
 from wbplan.robot import Robot
 from wbplan.state import find_frame
@@ -65,6 +67,7 @@ class CollisionModel:
         bound: (P,) the distance [m] to keep; promised: (P,) whether that is the phase's promise.
         influence: (P,) [m].
         fields: the height fields, as obstacles.
+        still: pairs whose distance no motion of the phase changes: first, second, bound, promised.
     """
 
     geometry: Any
@@ -75,6 +78,7 @@ class CollisionModel:
     promised: NDArray[np.bool_]
     influence: Array
     fields: tuple[Obstacle, ...]
+    still: tuple[tuple[int, int, float, bool], ...]
 
     def name(self, pair: int) -> str:
         """The names of a pair, as 'leg3_shank - body'."""
@@ -115,18 +119,26 @@ class _Builder:
         self.compiled, self.model, self.robot = compiled, compiled.model, compiled.robot
         self.geometry = robot_shapes(self.robot, self.model)
         frames = self.model.frames
-        self.things = [Thing(frames[g.parentFrame].name, g.parentJoint, True) for g in self.geometry.geometryObjects]
+        self.things = [
+            Thing(frames[g.parentFrame].name, g.parentJoint, True) for g in self.geometry.geometryObjects
+        ]
         self.fields: list[Obstacle] = []
         self.pairs: list[tuple[int, int, float, bool, float]] = []
+        self.still: list[tuple[int, int, float, bool]] = []
+        resting = {6 + d.joint for d in compiled.driven if d.path.constant}
+        self.moving = [self._columns(joint) - resting for joint in range(self.model.njoints)]
 
     def build(self) -> CollisionModel:
         phase = self.compiled.phase
         for held in self.compiled.held:
-            joint, placement = self.model.frames[held.frame].parentJoint, self.model.frames[held.frame].placement
+            joint, placement = (
+                self.model.frames[held.frame].parentJoint,
+                self.model.frames[held.frame].placement,
+            )
             self._add(Thing(held.body.name, joint, False), coal.Box(*held.body.size), placement)
         moving = len(self.things)
         if phase.self_collision is not None:
-            self._among_itself(moving, phase.self_collision.distance, phase.self_collision.influence)
+            self._among_itself(moving, phase.self_collision)
         if phase.obstacles is not None:
             for body, pose in self.compiled.standing:
                 self._add(Thing(body.name, WORLD_JOINT, False, True), coal.Box(*body.size), pose)
@@ -141,7 +153,7 @@ class _Builder:
         for first, second, *_ in self.pairs:
             if second < shapes:
                 self.geometry.addCollisionPair(pin.CollisionPair(first, second))
-        columns = list(zip(*self.pairs, strict=True)) or [[]] * 5
+        columns: list[Any] = list(zip(*self.pairs, strict=True)) or [[]] * 5
         return CollisionModel(
             self.geometry,
             tuple(self.things),
@@ -151,26 +163,39 @@ class _Builder:
             np.array(columns[3], dtype=np.bool_),
             np.array(columns[4], dtype=np.float64),
             tuple(self.fields),
+            tuple(self.still),
         )
 
     def _add(self, thing: Thing, shape: Any, placement: Any) -> None:
         name = f"{thing.name}#{len(self.things)}"
-        self.geometry.addGeometryObject(pin.GeometryObject(name, thing.joint, shape, placement))
+        self.geometry.addGeometryObject(pin.GeometryObject(name, thing.joint, 0, placement, shape))
         self.things.append(thing)
 
-    def _among_itself(self, count: int, distance: float, influence: float) -> None:
-        ignored = self.robot.ignored_collisions
+    def _columns(self, joint: int) -> set[int]:
+        """Columns of the velocity that move a joint."""
+        joints = [self.model.joints[k] for k in list(self.model.supports[joint])[1:]] if joint else []
+        return {column for j in joints for column in range(j.idx_v, j.idx_v + j.nv)}
+
+    def _among_itself(self, count: int, limit: SelfCollision) -> None:
+        ignored, closer = self.robot.ignored_collisions, {frozenset(pair) for pair in limit.except_for}
+        for name in {name for pair in limit.except_for for name in pair}:
+            self._named(name, "SelfCollision")
         holding = {held.body.name: self._holders(held.holder) for held in self.compiled.held}
         for i in range(count):
             for j in range(i + 1, count):
                 a, b = self.things[i], self.things[j]
-                if a.joint == b.joint or frozenset((a.name, b.name)) in ignored:
+                names = frozenset((a.name, b.name))
+                if a.joint == b.joint or names in ignored:
                     continue
                 if a.link and b.link and self._neighbours(a.joint, b.joint):
                     continue
                 if b.joint in holding.get(a.name, ()) or a.joint in holding.get(b.name, ()):
                     continue
-                self.pairs.append((i, j, distance, True, influence))
+                bound = 0.0 if names in closer else limit.distance
+                if self.moving[a.joint] == self.moving[b.joint]:
+                    self.still.append((i, j, bound, names not in closer))
+                else:
+                    self.pairs.append((i, j, bound, names not in closer, limit.influence))
 
     def _neighbours(self, a: int, b: int) -> bool:
         return int(self.model.parents[a]) == b or int(self.model.parents[b]) == a
@@ -188,13 +213,13 @@ class _Builder:
 
     def _against_the_world(self, moving: int) -> None:
         limit, phase = self.compiled.phase.obstacles, self.compiled.phase
-        assert limit is not None  # noqa: S101
+        assert limit is not None
         standing = self._shapes_of([c.frame for c in phase.contacts])
         feet = self._shapes_of(self.robot.feet.values())
-        touching = {name: feet for name in ("",)}
+        touching = dict.fromkeys(("",), feet)
         for item in limit.except_for:
             frame, obstacle = item if isinstance(item, tuple) else (item, "")
-            found = self._named(frame)
+            found = self._named(frame, "Obstacles")
             if obstacle and obstacle not in {t.name for t in self.things[moving:]}:
                 continue  # a body that is carried just now, say
             touching[obstacle] = touching.get(obstacle, frozenset()) | found
@@ -206,7 +231,7 @@ class _Builder:
                 bound = -TOUCH if may else limit.distance
                 self.pairs.append((i, j, bound, not may, limit.influence))
 
-    def _named(self, name: str) -> frozenset[int]:
+    def _named(self, name: str, limit: str) -> frozenset[int]:
         """Shapes of a carried body or of a frame's link, which `except_for` names."""
         if any(held.body.name == name for held in self.compiled.held):
             return frozenset(i for i, thing in enumerate(self.things) if thing.name == name)
@@ -215,11 +240,11 @@ class _Builder:
         try:
             find_frame(self.model, name)
         except SpecError as error:
-            raise SpecError(f"phase '{self.compiled.phase.name}': Obstacles.except_for: {error}") from None
+            raise SpecError(f"phase '{self.compiled.phase.name}': {limit}.except_for: {error}") from None
         return self._shapes_of([name])
 
     def _shapes_of(self, frames: Iterable[str]) -> frozenset[int]:
-        """The shapes of the frames' links; where a link has none, those on its joint that reach to the frame."""
+        """The shapes of the frames' links; where a link has none, those on its joint that reach there."""
         found: set[int] = set()
         for name in frames:
             frame = self.model.frames[find_frame(self.model, name)]
