@@ -16,6 +16,7 @@ from wbplan.errors import (
     WbplanError,
 )
 from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
@@ -37,6 +38,7 @@ from wbplan.version import VERSION as __version__
 __all__ = [
     "AS_IS",
     "Active",
+    "BalanceTask",
     "Body",
     "Bundle",
     "BundleError",
@@ -52,6 +54,7 @@ __all__ = [
     "Line",
     "Live",
     "Loop",
+    "ManipulabilityTask",
     "MinJerk",
     "ModelError",
     "OrientationTask",

@@ -12,9 +12,11 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.aims import AscentTarget, ascent_target, balance_path
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
@@ -99,6 +101,7 @@ class CompiledPhase:
         free: columns (nf,) of the velocity that the QP decides: the base and the free joints.
         driven: joints whose motion is given.
         polygon: support polygon of the contacts, `None` where the phase has no such limit.
+        ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
     """
 
@@ -116,6 +119,7 @@ class CompiledPhase:
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
+    ascents: tuple[AscentTarget, ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -152,13 +156,8 @@ def compile_phase(
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
     frames = _frame_targets(phase, model, state)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
-    polygon = None
-    if phase.support is not None:
-        try:
-            polygon = support_polygon(points[:, :2])
-        except SpecError as error:
-            names = ", ".join(c.frame for c in phase.contacts) or "none"
-            raise SpecError(f"{at}: its contacts ({names}) span no support polygon: {error}") from None
+    balance = [t for t in phase.soft if isinstance(t, BalanceTask)]
+    region = _region(phase, points) if phase.support is not None or balance else None
     tasks = (*phase.hard, *phase.soft)
     coms = tuple(
         ComTarget(
@@ -171,6 +170,11 @@ def compile_phase(
         for t in tasks
         if isinstance(t, ComTask)
     )
+    if region is not None:
+        coms += tuple(
+            ComTarget(t.label, balance_path(t, region, state.com, np.zeros(3)), t.weights, t.gain, False)
+            for t in balance
+        )
     joints = tuple(
         _joint_target(robot, t, q, given, t in phase.hard, at) for t in tasks if isinstance(t, PostureTask)
     )
@@ -186,11 +190,23 @@ def compile_phase(
         damping,
         free,
         driven,
-        polygon,
+        None if phase.support is None else region,
         points,
         held,
         {**now, **phase.roles},
+        tuple(ascent_target(t, phase, model) for t in phase.soft if isinstance(t, ManipulabilityTask)),
     )
+
+
+def _region(phase: Phase, points: Array) -> HalfPlanes:
+    """Where the CoM may be over a phase's contacts."""
+    try:
+        return support_polygon(points[:, :2])
+    except SpecError as error:
+        names = ", ".join(c.frame for c in phase.contacts) or "none"
+        raise SpecError(
+            f"phase '{phase.name}': its contacts ({names}) span no support polygon: {error}"
+        ) from None
 
 
 def _roles_now(robot: Robot, q: Array, given: Mapping[str, str | None]) -> dict[str, str | None]:

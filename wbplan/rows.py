@@ -39,6 +39,17 @@ def support_mask(model: Any, frame: int) -> Array:
     return mask
 
 
+def reach(model: Any, frame: int) -> float:
+    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
+    if frame == WORLD:
+        return 0.0
+    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
+    links = [model.jointPlacements[j].translation for j in joints] + [
+        model.frames[frame].placement.translation
+    ]
+    return float(sum(np.linalg.norm(link) for link in links))
+
+
 def _pairs(targets: Sequence[FrameTarget], slot: dict[int, int]) -> NDArray[np.intp]:
     """(k, 2) where the frame and the root of each target stand among the frames that are read."""
     return np.array([(slot[t.frame], slot[t.root]) for t in targets], dtype=np.intp).reshape(-1, 2)

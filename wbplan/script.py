@@ -12,6 +12,7 @@ from wbplan.bodies import Body, Carried
 from wbplan.contacts import Contact
 from wbplan.errors import SpecError, listing
 from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.objectives import Objective
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
 from wbplan.state import State
 from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
@@ -113,6 +114,11 @@ class Phase:
                 raise SpecError(f"{at}.limits: more than one {kind.__name__}")
         if any(isinstance(t, DampingTask) for t in self.hard):
             raise SpecError(f"{at}.hard: a damping task forbids all motion; put it in soft")
+        objectives = [t.label for t in self.hard if isinstance(t, Objective)]
+        if objectives:
+            raise SpecError(
+                f"{at}.hard: {listing(objectives)} has no target to be met in full; put it in soft"
+            )
 
     @property
     def margin(self) -> float | None:
