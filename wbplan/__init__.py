@@ -4,7 +4,7 @@ from wbplan.active import Active
 from wbplan.bodies import Body, Carried
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.contacts import Contact
+from wbplan.contacts import Contact, Push
 from wbplan.errors import (
     BundleError,
     CheckFailed,
@@ -15,8 +15,9 @@ from wbplan.errors import (
     ViewError,
     WbplanError,
 )
-from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
 from wbplan.objectives import BalanceTask, ManipulabilityTask
+from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
@@ -40,6 +41,7 @@ __all__ = [
     "Active",
     "BalanceTask",
     "Body",
+    "Box",
     "Bundle",
     "BundleError",
     "Carried",
@@ -48,15 +50,21 @@ __all__ = [
     "ComTask",
     "Contact",
     "Curve",
+    "Cylinder",
     "DampingTask",
+    "Ground",
+    "HeightField",
     "Hold",
     "JointLimits",
     "Line",
     "Live",
     "Loop",
     "ManipulabilityTask",
+    "Mesh",
     "MinJerk",
     "ModelError",
+    "Obstacle",
+    "Obstacles",
     "OrientationTask",
     "Path",
     "Phase",
@@ -64,16 +72,20 @@ __all__ = [
     "PoseTask",
     "PositionTask",
     "PostureTask",
+    "Push",
     "RelativePoseTask",
     "Relaxation",
     "Robot",
     "Script",
+    "SelfCollision",
     "SolveError",
     "SpecError",
+    "Sphere",
     "State",
     "SupportPolygon",
     "Swing",
     "Task",
+    "Terrain",
     "Tick",
     "Trajectory",
     "ViewError",

@@ -50,18 +50,35 @@ class Settle(Path):
         return found
 
 
-def balance_path(task: BalanceTask, region: HalfPlanes, com: Array, velocity: Array) -> Path:
-    """The CoM's target: to the point of the region's largest margin, at its own height.
+@final
+@dataclass(frozen=True, eq=False)
+class ComTarget:
+    """A CoM task with its target bound."""
+
+    label: str
+    path: Path
+    weight: Array
+    gain: float
+    hard: bool
+    level: int = 0
+
+
+def balance_target(
+    task: BalanceTask, region: HalfPlanes, com: Array, velocity: Array, level: int
+) -> ComTarget:
+    """The CoM on its way to the point of the region's largest margin, at its own height.
 
     Args:
         task: the task.
         region: of the CoM's places that the contacts hold.
         com: (3,) [m] at the phase's start.
         velocity: (3,) [m/s] of the CoM then.
+        level: of the task.
     """
     goal = np.array(com)
     goal[:2] = region.chebyshev()[0]
-    return Settle(com, velocity * (1.0, 1.0, 0.0), goal, task.settle)
+    path = Settle(com, velocity * (1.0, 1.0, 0.0), goal, task.settle)
+    return ComTarget(task.label, path, task.weight * np.array([1.0, 1.0, 0.0]), task.gain, False, level)
 
 
 @final

@@ -255,7 +255,8 @@ class Manipulability:
             self._places[count], self._places[:count], masks[count], masks[:count], carries,
             np.array(mobility), rows.start, rows.stop, np.zeros((count + 1, 6, nv)),
             np.zeros((3 * count, nv)), np.zeros((3 * count, 3 * count)), np.zeros((3 * count, nv)),
-            np.zeros((m, nv)), np.zeros((m, m)), np.zeros((m, nv)), np.zeros((nv, 3)), np.zeros((nv, 3)), self.gradient,
+            np.zeros((m, nv)), np.zeros((m, m)), np.zeros((m, nv)), np.zeros((nv, 3)), np.zeros((nv, 3)),
+            self.gradient,
         )  # fmt: skip
 
     def evaluate(self) -> tuple[float, float]:

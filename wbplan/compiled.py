@@ -12,15 +12,16 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.aims import AscentTarget, ascent_target, balance_path
+from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
-from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.geometry import HalfPlanes
 from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
 from wbplan.state import State, find_frame
+from wbplan.statics import support
 from wbplan.tasks import ComTask, DampingTask, PostureTask, check_kind
 
 Array = NDArray[np.float64]
@@ -39,6 +40,7 @@ class FrameTarget:
         position_weight, rotation_weight: (3,); a zero leaves the row out.
         gain: [1/s].
         hard: rows are equalities, weights then count only as zero or not.
+        level: of a soft one, from 0, the highest.
     """
 
     label: str
@@ -49,18 +51,7 @@ class FrameTarget:
     rotation_weight: Array
     gain: float
     hard: bool
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class ComTarget:
-    """A CoM task with its target bound."""
-
-    label: str
-    path: Path
-    weight: Array
-    gain: float
-    hard: bool
+    level: int = 0
 
 
 @final
@@ -78,6 +69,7 @@ class JointTarget:
     weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -100,7 +92,10 @@ class CompiledPhase:
         frame_targets: contacts first, then hard tasks, then soft ones.
         free: columns (nf,) of the velocity that the QP decides: the base and the free joints.
         driven: joints whose motion is given.
-        polygon: support polygon of the contacts, `None` where the phase has no such limit.
+        polygon: where the CoM may be, the hull of the contacts or their region; `None` where the phase has no
+            such limit.
+        region: whether `polygon` is the static-equilibrium region: the hull is not, unless the contacts lie
+            in one plane and nothing pushes.
         ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
     """
@@ -116,6 +111,7 @@ class CompiledPhase:
     free: NDArray[np.intp]
     driven: tuple[Driven, ...]
     polygon: HalfPlanes | None
+    region: bool
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
@@ -154,11 +150,11 @@ def compile_phase(
     given = {d.joint for d in driven}
     free = np.array([*range(6), *(6 + j for j in range(model.nv - 6) if j not in given)], dtype=np.intp)
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
-    frames = _frame_targets(phase, model, state)
+    level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
+    frames = _frame_targets(phase, model, state, level)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
-    balance = [t for t in phase.soft if isinstance(t, BalanceTask)]
-    region = _region(phase, points) if phase.support is not None or balance else None
-    tasks = (*phase.hard, *phase.soft)
+    balance = [t for t in phase.soft_tasks if isinstance(t, BalanceTask)]
+    polygon, region = support(phase, model, state, points, wanted=bool(balance))
     coms = tuple(
         ComTarget(
             t.label,
@@ -166,19 +162,19 @@ def compile_phase(
             t.position_weight,
             t.gain,
             t in phase.hard,
+            level.get(id(t), 0),
         )
-        for t in tasks
+        for t in phase.tasks
         if isinstance(t, ComTask)
     )
-    if region is not None:
-        coms += tuple(
-            ComTarget(t.label, balance_path(t, region, state.com, np.zeros(3)), t.weights, t.gain, False)
-            for t in balance
-        )
+    if polygon is not None:
+        coms += tuple(balance_target(t, polygon, state.com, np.zeros(3), level[id(t)]) for t in balance)
     joints = tuple(
-        _joint_target(robot, t, q, given, t in phase.hard, at) for t in tasks if isinstance(t, PostureTask)
+        _joint_target(robot, t, q, given, t in phase.hard, level.get(id(t), 0), at)
+        for t in phase.tasks
+        if isinstance(t, PostureTask)
     )
-    damping = float(sum(t.weight**2 for t in phase.soft if isinstance(t, DampingTask)))
+    damping = float(sum(t.weight**2 for t in phase.soft_tasks if isinstance(t, DampingTask)))
     return CompiledPhase(
         robot,
         phase,
@@ -190,23 +186,13 @@ def compile_phase(
         damping,
         free,
         driven,
-        None if phase.support is None else region,
+        None if phase.support is None else polygon,
+        region,
         points,
         held,
         {**now, **phase.roles},
-        tuple(ascent_target(t, phase, model) for t in phase.soft if isinstance(t, ManipulabilityTask)),
+        tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
     )
-
-
-def _region(phase: Phase, points: Array) -> HalfPlanes:
-    """Where the CoM may be over a phase's contacts."""
-    try:
-        return support_polygon(points[:, :2])
-    except SpecError as error:
-        names = ", ".join(c.frame for c in phase.contacts) or "none"
-        raise SpecError(
-            f"phase '{phase.name}': its contacts ({names}) span no support polygon: {error}"
-        ) from None
 
 
 def _roles_now(robot: Robot, q: Array, given: Mapping[str, str | None]) -> dict[str, str | None]:
@@ -326,7 +312,9 @@ def _check_feet(
                 raise SpecError(f"{at}: contact '{foot}' while {limb} changes its role ({joints} move)")
 
 
-def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget, ...]:
+def _frame_targets(
+    phase: Phase, model: Any, state: State, level: Mapping[int, int]
+) -> tuple[FrameTarget, ...]:
     """Contacts, then hard tasks, then soft ones."""
     targets = [
         FrameTarget(
@@ -360,13 +348,14 @@ def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget,
                 task.rotation_weight,
                 task.gain,
                 task in phase.hard,
+                level.get(id(task), 0),
             )
         )
     return tuple(targets)
 
 
 def _joint_target(
-    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, at: str
+    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, level: int, at: str
 ) -> JointTarget:
     """Target and weight of every joint that the task asks for and the phase leaves free."""
     what = f"{at}, {task.label}"
@@ -394,4 +383,4 @@ def _joint_target(
         weight[j] = weights.get(name, 0.0)
         path = values.get(name, Hold(goal[j]))
         paths.append((j, _bound(path, np.asarray(q[7 + j]), f"{what}.target['{name}']", (NUMBER,))))
-    return JointTarget(task.label, tuple(paths), weight, task.gain, hard)
+    return JointTarget(task.label, tuple(paths), weight, task.gain, hard, level)

@@ -8,9 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wbplan.errors import SpecError
 from wbplan.paths import name_of, number
 from wbplan.tasks import GAIN, Task
@@ -63,11 +60,6 @@ class BalanceTask(Objective):
         """See `Task.label`."""
         return self.name or "balance"
 
-    @property
-    def weights(self) -> NDArray[np.float64]:
-        """Weights (3,) [1/m] along the world's axes."""
-        return self.weight * np.array([1.0, 1.0, 0.0])
-
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -76,8 +68,8 @@ class ManipulabilityTask(Objective):
 
     w = sqrt(det(J J^T)), where J (m x c) takes a motion that keeps the contacts to the tip's velocity in m
     and rad, m = 3 or 6. Motions count by the base's velocity [m/s, rad/s] and the rates of all free joints
-    that are not in a stance leg; stance legs follow, at `legs` times the cost of other joints. With `legs`
-    = 0 and legs that can follow any motion of the base, J is [[1, -[r]x, J_v], [0, 1, J_w]] over base and arm.
+    that are not in a stance leg; stance legs follow, at `legs` times the cost of other joints. At 0,
+    with legs that can follow any motion of the base, J is [[1, -[r]x, J_v], [0, 1, J_w]] over base and arm.
 
     The task costs -weight^2 log w, so a rise of w by a share is worth the same at any size of w. Its step is
     that of steepest ascent in the norm which w is made with, damped by a bound of the curvature of log w:

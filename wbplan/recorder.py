@@ -10,6 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
+from wbplan.compiled import CompiledPhase
+from wbplan.obstacles import to_record
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop, Tick
@@ -90,14 +92,15 @@ class Recorder:
         first = self._phase.index(index)
         errors = self._errors[first:]
         tasks = []
-        for task in (*phase.hard, *phase.soft):
+        level = {task: k for k, tasks in enumerate(phase.levels) for task in tasks}
+        for task in phase.tasks:
             worst = {
                 part: max(
                     (e[f"{task.label}.{part}"] for e in errors if f"{task.label}.{part}" in e), default=None
                 )
                 for part in ("position", "orientation", "joints")
             }
-            tasks.append({"name": task.label, "hard": task in phase.hard, **worst})
+            tasks.append({"name": task.label, "hard": task in phase.hard, "level": level.get(task), **worst})
         self._phases.append(
             {
                 "name": phase.name,
@@ -119,6 +122,8 @@ class Recorder:
                     }
                     for h in loop.compiled.held
                 ],
+                **_region(loop.compiled),
+                "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
             }
@@ -160,10 +165,21 @@ class Recorder:
             "dt": self._dt,
             "parameters": parameters,
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
+            "obstacles": [to_record(item) for item in self._script.obstacles],
             "phases": self._phases,
             "report": report,
         }
         return Bundle(plan, trajectory, self._robot.urdf_text)
+
+
+def _region(compiled: CompiledPhase) -> dict[str, Any]:
+    """What stands in plan.json only where it is: the region's corners, and forces on the surroundings."""
+    found: dict[str, Any] = {}
+    if compiled.region and compiled.polygon is not None:
+        found["region"] = compiled.polygon.vertices.tolist()
+    if compiled.phase.pushes:
+        found["pushes"] = [{"frame": p.frame, "force": list(p.force)} for p in compiled.phase.pushes]
+    return found
 
 
 def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wbplan import kernels
-from wbplan.compiled import WORLD, ComTarget, FrameTarget
+from wbplan.aims import ComTarget
+from wbplan.compiled import WORLD, FrameTarget
 from wbplan.kinematics import Kinematics
 from wbplan.paths import checked
 from wbplan.sampling import sample

@@ -15,6 +15,7 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -42,6 +43,24 @@ UNBOUNDED = 1e20
 
 
 @final
+@dataclass(frozen=True)
+class RowBlock:
+    """Inequality rows of one kind: consecutive rows of C.
+
+    Attributes:
+        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
+        span: where its rows stand.
+        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
+            gives one name a row, '' for a row that is not in use.
+    """
+
+    kind: str
+    unit: str
+    span: slice
+    keep: Callable[[], Callable[[], list[str]]]
+
+
+@final
 class Stack:
     """Matrices of a compiled phase, filled in place.
 
@@ -54,6 +73,7 @@ class Stack:
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
         damping: what stands on the whole diagonal of H, at the last `assemble`.
+        blocks: what the rows of C are.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
         ascents: manipulability tasks.
@@ -164,7 +184,11 @@ class Stack:
         polygon = self.phase.polygon
         self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
         self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
-        self.C, self.d = np.zeros((len(self._offsets), len(self.free))), np.zeros(len(self._offsets))
+        edges = len(self._offsets)
+        self.C, self.d = np.zeros((edges, len(self.free))), np.zeros(edges)
+        self.blocks: list[RowBlock] = []
+        if edges:
+            self.blocks.append(RowBlock("margin", "m", slice(0, edges), lambda: self.edge_names))
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -289,10 +313,28 @@ class Stack:
         }
         return names + [(label, "m" if j in sliding else "rad") for j, _, label in self.hard_joints]
 
+    def row_names(self) -> list[tuple[str, str, str]]:
+        """(name, kind, unit) of every row of C as it is now."""
+        return self.keep_row_names()()
+
+    def keep_row_names(self) -> Callable[[], list[tuple[str, str, str]]]:
+        """`row_names` of this moment, to be worked out whenever somebody asks."""
+        return partial(self._name_rows, [block.keep() for block in self.blocks])
+
+    def _name_rows(self, names: list[Callable[[], list[str]]]) -> list[tuple[str, str, str]]:
+        return [
+            (name, block.kind, block.unit)
+            for block, called in zip(self.blocks, names, strict=True)
+            for name in called()
+        ]
+
     def edge_names(self) -> list[str]:
-        """Name of every support-polygon row: the two feet that its edge joins."""
+        """Name of every support-polygon row: the two feet that its edge joins, or a side of the region."""
         if self.phase.polygon is None:
             return []
+        if self.phase.region:
+            angles = np.degrees(np.arctan2(*self.phase.polygon.normals.T[::-1]))
+            return [f"support region, side towards {angle:.0f} deg" for angle in angles]
         feet = [c.frame for c in self.phase.phase.contacts]
         return [f"support polygon edge {feet[i]}-{feet[j]}" for i, j in self.phase.polygon.edges]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wbplan.mechanism import forward
-from wbplan.papers import mana, mana_motion
+from wbplan.papers import mana, mana_motion, mana_simulated
 
 from .conftest import Judge
 
@@ -93,3 +93,14 @@ def test_section_5_3_helix_and_combined_motion(judge: Judge) -> None:
 @pytest.mark.slow
 def test_figures_8_to_10_planned_by_the_qp_agree_with_the_closed_form(judge: Judge) -> None:
     assert len(judge(mana_motion.figures_8_to_10())) == 4
+
+
+def test_figures_8_to_10_simulated_with_feet_that_roll_and_feet_as_ball_joints(judge: Judge) -> None:
+    assert len(judge(mana_simulated.figures_8_to_10_simulated())) == 4
+    for task in ("body_helix", "body_sway"):
+        done = mana_simulated.compare(task)
+        place, turn = done.worst("ball")
+        as_joints = done.worst("joint")
+        assert place > 5 * as_joints[0], "a ball of 15 mm rolls: that has to be seen"
+        assert turn > as_joints[1]
+        assert np.ptp(done.prescribed, axis=0).max() > 20.0, "the body moves"

@@ -21,8 +21,9 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
+from wbplan.aims import ComTarget
 from wbplan.backends.placo_ascent import PlacoAscent
-from wbplan.compiled import WORLD, CompiledPhase, ComTarget, FrameTarget
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.qp import Solution

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import files, rules
 from wbplan.errors import BundleError
+from wbplan.obstacles import Obstacle
 
 Array = NDArray[np.float64]
 
@@ -76,6 +77,15 @@ class Bundle:
     def phases(self) -> list[dict[str, Any]]:
         """The phases' promises, in the order of time."""
         return list(self.plan["phases"])
+
+    @cached_property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What stands in the world in any phase; a phase's `obstacles` names those that stand in it.
+
+        Raises:
+            BundleError: an entry is no obstacle.
+        """
+        return rules.obstacles_of(self.plan, files.PLAN)
 
     @cached_property
     def model(self) -> Any:

@@ -12,7 +12,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.errors import BundleError, listing
+from wbplan.errors import BundleError, SpecError, listing
+from wbplan.obstacles import Obstacle, from_record
 
 if TYPE_CHECKING:
     from wbplan.bundle.data import Trajectory
@@ -200,14 +201,32 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["dt"].fail("a number above 0")
     if not isinstance(root["report"].value, Mapping):
         raise root["report"].fail("an object")
+    standing = {item.name for item in obstacles_of(plan, where)}
     for phase in root["phases"].items(least=1):
         _check_phase(phase, model)
+        for name in phase["obstacles"].items() if "obstacles" in phase else ():
+            if name.text() not in standing:
+                raise name.fail(f"one of the plan's obstacles, {listing(sorted(standing))}")
     if "joint_acceleration" in root and (root["joint_acceleration"].vector(model.nv - 6) < 0.0).any():
         raise root["joint_acceleration"].fail("bounds of at least 0")
     for body in root["bodies"].items() if "bodies" in root else ():
         body["name"].text()
         body["size"].vector(3)
         body["mass"].number(0.0)
+
+
+def obstacles_of(plan: Mapping[str, Any], where: str) -> tuple[Obstacle, ...]:
+    """The obstacles of a plan.json, or a `BundleError`."""
+    root = _Field(plan, where)
+    found: list[Obstacle] = []
+    for item in root["obstacles"].items() if "obstacles" in root else ():
+        try:
+            found.append(from_record(item.value))
+        except SpecError as error:
+            raise BundleError(f"{item.where}: {error}") from None
+        if found[-1].name in {other.name for other in found[:-1]}:
+            raise item["name"].fail("a name that no other obstacle has")
+    return tuple(found)
 
 
 def _check_phase(phase: _Field, model: Any) -> None:
@@ -235,6 +254,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
         task["name"].text()
     if "clearance" in phase:
         phase["clearance"].number()
+    for push in phase["pushes"].items() if "pushes" in phase else ():
+        push["frame"].frame(model)
+        push["force"].vector(3)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 
