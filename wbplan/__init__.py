@@ -4,7 +4,7 @@ from wbplan.active import Active
 from wbplan.bodies import Body, Carried
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.contacts import Contact
+from wbplan.contacts import Contact, Push
 from wbplan.errors import (
     BundleError,
     CheckFailed,
@@ -69,6 +69,7 @@ __all__ = [
     "PoseTask",
     "PositionTask",
     "PostureTask",
+    "Push",
     "RelativePoseTask",
     "Relaxation",
     "Robot",

@@ -100,7 +100,7 @@ class Carried:
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A carried body: its pose in the holding frame, its own frame's number in the phase's model, its pads."""
+    """A carried body: its pose in the holding frame, its frame's number in the phase's model, its pads."""
 
     body: Body
     holder: str

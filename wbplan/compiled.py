@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
-from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.geometry import HalfPlanes
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
 from wbplan.state import State, find_frame
+from wbplan.statics import support
 from wbplan.tasks import ComTask, DampingTask, PostureTask, check_kind
 
 Array = NDArray[np.float64]
@@ -102,7 +103,10 @@ class CompiledPhase:
         frame_targets: contacts first, then hard tasks, then soft ones.
         free: columns (nf,) of the velocity that the QP decides: the base and the free joints.
         driven: joints whose motion is given.
-        polygon: support polygon of the contacts, `None` where the phase has no such limit.
+        polygon: where the CoM may be, the hull of the contacts or their region; `None` where the phase has no
+            such limit.
+        region: whether `polygon` is the static-equilibrium region: the hull is not, unless the contacts lie
+            in one plane and nothing pushes.
         contact_points: (C, 3) [m], world.
     """
 
@@ -117,6 +121,7 @@ class CompiledPhase:
     free: NDArray[np.intp]
     driven: tuple[Driven, ...]
     polygon: HalfPlanes | None
+    region: bool
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
@@ -157,13 +162,7 @@ def compile_phase(
     level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
     frames = _frame_targets(phase, model, state, level)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
-    polygon = None
-    if phase.support is not None:
-        try:
-            polygon = support_polygon(points[:, :2])
-        except SpecError as error:
-            names = ", ".join(c.frame for c in phase.contacts) or "none"
-            raise SpecError(f"{at}: its contacts ({names}) span no support polygon: {error}") from None
+    polygon, region = support(phase, model, state, points)
     coms = tuple(
         ComTarget(
             t.label,
@@ -194,6 +193,7 @@ def compile_phase(
         free,
         driven,
         polygon,
+        region,
         points,
         held,
         {**now, **phase.roles},

@@ -76,6 +76,13 @@ class HalfPlanes:
         flat = FLAT * _extent(self.vertices)
         return _without_flat_corners(left, list(range(len(left))), flat)[0]
 
+    def common(self, other: HalfPlanes) -> Array:
+        """Corners (W, 2) [m], counter-clockwise, of what two polygons share; (0, 2) if nothing."""
+        left = self.vertices
+        for normal, offset in zip(other.normals, other.offsets, strict=True):
+            left = _clip(left, normal, offset)
+        return left
+
     def chebyshev(self) -> tuple[Array, float]:
         """Centre (2,) [m] and radius [m] of the largest circle inside.
 

@@ -40,6 +40,8 @@ class SupportPolygon:
     """The CoM of robot and carried bodies stays `margin` [m] inside the hull of the phase's contacts.
 
     N (c + J dq) <= d - margin, with N the unit normals of the edges, in the horizontal plane.
+    Where the contacts do not lie in one plane that is their ground, or the phase pushes on something, the
+    static-equilibrium region (see `wbplan.statics`) stands for the hull.
     A CoM that starts outside moves inward at `recovery_speed`, and never outward, until it is inside.
 
     Args:

@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
+from wbplan.compiled import CompiledPhase
 from wbplan.obstacles import to_record
 from wbplan.robot import Robot
 from wbplan.script import Script
@@ -119,6 +120,7 @@ class Recorder:
                     }
                     for h in loop.compiled.held
                 ],
+                **_region(loop.compiled),
                 "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
@@ -165,6 +167,16 @@ class Recorder:
             "report": report,
         }
         return Bundle(plan, trajectory, self._robot.urdf_text)
+
+
+def _region(compiled: CompiledPhase) -> dict[str, Any]:
+    """What stands in plan.json only where it is: the region's corners, and forces on the surroundings."""
+    found: dict[str, Any] = {}
+    if compiled.region and compiled.polygon is not None:
+        found["region"] = compiled.polygon.vertices.tolist()
+    if compiled.phase.pushes:
+        found["pushes"] = [{"frame": p.frame, "force": list(p.force)} for p in compiled.phase.pushes]
+    return found
 
 
 def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:

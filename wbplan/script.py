@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, final
 
 from wbplan.bodies import Body, Carried
-from wbplan.contacts import Contact
+from wbplan.contacts import Contact, Push
 from wbplan.errors import SpecError, listing
 from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
 from wbplan.obstacles import Obstacle
@@ -94,6 +94,7 @@ class Phase:
         driven: joint -> path of its motion, from where it is when the phase begins; or a value, which it
             moves to over the phase. Such joints are not the QP's.
         locked: joints that stay as they are; not the QP's.
+        pushes: forces with which frames push on what is around.
 
     Raises:
         SpecError: a field is not what it has to be.
@@ -109,6 +110,7 @@ class Phase:
     roles: Mapping[str, str] = field(default_factory=dict)
     driven: Mapping[str, Any] = field(default_factory=dict)
     locked: tuple[str, ...] = ()
+    pushes: tuple[Push, ...] = ()
 
     def __post_init__(self) -> None:
         at = f"phase '{name_of(self.name, 'Phase.name')}'"
@@ -119,12 +121,14 @@ class Phase:
         put("soft", _levels_of(self.soft, f"{at}.soft"))
         put("limits", _tuple_of(self.limits, LIMITS, f"{at}.limits"))
         put("locked", _tuple_of(self.locked, str, f"{at}.locked"))
+        put("pushes", _tuple_of(self.pushes, Push, f"{at}.pushes"))
         put("roles", _mapping(self.roles, f"{at}.roles", name_of))
         put("driven", _mapping(self.driven, f"{at}.driven", _driving))
         seconds = number(self.duration, f"{at}.duration", "a finite positive time in seconds", above=0.0)
         put("duration", seconds)
         _unique([c.frame for c in self.contacts], f"{at}.contacts")
         _unique([c.body.name for c in self.carried], f"{at}.carried")
+        _unique([p.frame for p in self.pushes], f"{at}.pushes")
         rows = [t.label for t in self.tasks] + [f"contact({c.frame})" for c in self.contacts]
         _unique(rows, f"{at}: tasks (give name=...)")
         both = sorted(set(self.driven) & set(self.locked))

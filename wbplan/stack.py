@@ -334,9 +334,12 @@ class Stack:
         ]
 
     def edge_names(self) -> list[str]:
-        """Name of every support-polygon row: the two feet that its edge joins."""
+        """Name of every support-polygon row: the two feet that its edge joins, or a side of the region."""
         if self.phase.polygon is None:
             return []
+        if self.phase.region:
+            angles = np.degrees(np.arctan2(*self.phase.polygon.normals.T[::-1]))
+            return [f"support region, side towards {angle:.0f} deg" for angle in angles]
         feet = [c.frame for c in self.phase.phase.contacts]
         return [f"support polygon edge {feet[i]}-{feet[j]}" for i, j in self.phase.polygon.edges]
 

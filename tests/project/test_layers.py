@@ -24,6 +24,7 @@ LAYERS = [
     "limits",
     "bodies",
     "script",
+    "statics",
     "compiled",
     "kinematics",
     "kernels",

@@ -254,6 +254,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
         task["name"].text()
     if "clearance" in phase:
         phase["clearance"].number()
+    for push in phase["pushes"].items() if "pushes" in phase else ():
+        push["frame"].frame(model)
+        push["force"].vector(3)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 
