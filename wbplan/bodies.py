@@ -89,9 +89,10 @@ class Carried:
         if not isinstance(self.body, Body):
             raise SpecError(f"Carried.body: expected a wb.Body, got {self.body!r}")
         name_of(self.by, f"Carried '{self.body.name}'.by")
-        if isinstance(self.pads, str) or not isinstance(self.pads, Iterable):
-            raise SpecError(f"Carried '{self.body.name}'.pads: expected a list of frames, got {self.pads!r}")
-        pads = tuple(name_of(pad, f"Carried '{self.body.name}'.pads") for pad in self.pads)
+        given: Any = self.pads
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise SpecError(f"Carried '{self.body.name}'.pads: expected a list of frames, got {given!r}")
+        pads = tuple(name_of(pad, f"Carried '{self.body.name}'.pads") for pad in given)
         object.__setattr__(self, "pads", pads)
         if not isinstance(self.pose, AsIs):
             object.__setattr__(self, "pose", _pose(self.pose, f"Carried '{self.body.name}'.pose"))
