@@ -29,6 +29,7 @@ LAYERS = [
     "kinematics",
     "kernels",
     "sampling",
+    "gaits",
     "rows",
     "posture",
     "stack",
