@@ -1,5 +1,6 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
+from wbplan import gaits
 from wbplan.active import Active
 from wbplan.bodies import Body, Carried
 from wbplan.bundle import Bundle, Trajectory
@@ -8,6 +9,7 @@ from wbplan.contacts import Contact, Push
 from wbplan.errors import (
     BundleError,
     CheckFailed,
+    GaitError,
     ModelError,
     Relaxation,
     SolveError,
@@ -52,6 +54,7 @@ __all__ = [
     "Curve",
     "Cylinder",
     "DampingTask",
+    "GaitError",
     "Ground",
     "HeightField",
     "Hold",
@@ -93,6 +96,7 @@ __all__ = [
     "WbplanError",
     "__version__",
     "check",
+    "gaits",
     "load_robot",
     "plan",
 ]

@@ -119,6 +119,7 @@ class Recorder:
                         "pose": [float(x) for x in pin.SE3ToXYZQUAT(h.T_holder_body)],
                         "mass": h.body.mass,
                         "com": list(h.body.com),
+                        **({"pads": list(h.pads)} if h.pads else {}),
                     }
                     for h in loop.compiled.held
                 ],

@@ -31,6 +31,7 @@ LAYERS = [
     "kinematics",
     "kernels",
     "sampling",
+    "gaits",
     "rows",
     "posture",
     "ascent",

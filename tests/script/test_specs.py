@@ -116,6 +116,8 @@ def test_a_body_has_a_name_mass_size_and_place(fields: dict[str, Any], says: str
         ({"by": ""}, r"Carried 'box'\.by: expected a name"),
         ({"by": None}, r"Carried 'box'\.by: expected a name"),
         ({"pose": np.zeros(3)}, r"Carried 'box'\.pose: expected pin\.SE3"),
+        ({"pads": "tip"}, r"Carried 'box'\.pads: expected a list of frames, got 'tip'"),
+        ({"pads": [""]}, r"Carried 'box'\.pads: expected a name"),
         ({"pose": None}, r"Carried 'box'\.pose: expected pin\.SE3"),
         (
             {"pose": pin.SE3(np.eye(3), np.array([0.0, np.nan, 0.0]))},

@@ -250,6 +250,8 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for pad in item["pads"].items() if "pads" in item else ():
+            pad.frame(model)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:
