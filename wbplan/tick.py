@@ -55,6 +55,7 @@ class Tick:
         "__dict__",
         "_errors",
         "_held_back",
+        "_measures",
         "clearance",
         "com",
         "margin",
@@ -71,6 +72,7 @@ class Tick:
         self.com, self.margin = stack.kinematics.com.copy(), stack.margin
         self.clearance = np.inf if stack.clearance is None else stack.clearance.least
         self._errors, self._held_back = stack.keep_errors(), held_back
+        self._measures = stack.keep_measures()
         promised = loop.compiled.margin
         self.warning = ""
         if promised is not None and self.margin < promised - 1e-6:
@@ -87,6 +89,14 @@ class Tick:
         Keys: '<task>.position' [m], '<task>.orientation' [rad], '<task>.joints' [rad].
         """
         return self._errors()
+
+    @cached_property
+    def measures(self) -> Mapping[str, float]:
+        """What tasks without a target are at, at the end of the step.
+
+        Keys: '<task>.manipulability', w of a `ManipulabilityTask`.
+        """
+        return self._measures()
 
     @cached_property
     def active(self) -> tuple[Active, ...]:
