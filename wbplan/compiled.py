@@ -12,12 +12,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-<<<<<<< HEAD
-from wbplan.bodies import Body, Held, frame_number, standing, with_carried
-=======
 from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
-from wbplan.bodies import Held, frame_number, with_carried
->>>>>>> main
+from wbplan.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
 from wbplan.objectives import BalanceTask, ManipulabilityTask
@@ -120,11 +116,8 @@ class CompiledPhase:
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
-<<<<<<< HEAD
-    standing: tuple[tuple[Body, Any], ...] = ()
-=======
     ascents: tuple[AscentTarget, ...] = ()
->>>>>>> main
+    standing: tuple[tuple[Body, Any], ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -202,11 +195,8 @@ def compile_phase(
         points,
         held,
         {**now, **phase.roles},
-<<<<<<< HEAD
-        standing(phase.carried, placed or {}, bodies),
-=======
         tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
->>>>>>> main
+        standing(phase.carried, placed or {}, bodies),
     )
 
 

@@ -60,17 +60,3 @@ class Kinematics:
         """Jacobians at the current `q`."""
         pin.computeJointJacobians(self.model, self.data)
         pin.jacobianCenterOfMass(self.model, self.data, False)
-
-
-def reach(model: Any, frame: int) -> float:
-    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm.
-
-    0 for the world, whose number is negative.
-    """
-    if frame < 0:
-        return 0.0
-    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [
-        model.frames[frame].placement.translation
-    ]
-    return float(sum(np.linalg.norm(link) for link in links))

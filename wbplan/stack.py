@@ -15,7 +15,6 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -23,15 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan import kernels
-<<<<<<< HEAD
+from wbplan.ascent import Ascent
+from wbplan.blocks import RowBlock
 from wbplan.collision import CAPACITY, Clearance, collision_model
 from wbplan.compiled import CompiledPhase, FrameTarget
-from wbplan.kinematics import Kinematics, reach
-=======
-from wbplan.ascent import Ascent
-from wbplan.compiled import CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
->>>>>>> main
 from wbplan.paths import number
 from wbplan.posture import Posture
 from wbplan.rows import Rows, reach
@@ -46,24 +41,6 @@ MARGIN_RESERVE = 1e-4
 
 #: Stands for no bound in the QP.
 UNBOUNDED = 1e20
-
-
-@final
-@dataclass(frozen=True)
-class RowBlock:
-    """Inequality rows of one kind: consecutive rows of C.
-
-    Attributes:
-        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
-        span: where its rows stand.
-        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
-            gives one name a row, '' for a row that is not in use.
-    """
-
-    kind: str
-    unit: str
-    span: slice
-    keep: Callable[[], Callable[[], list[str]]]
 
 
 @final
@@ -101,11 +78,8 @@ class Stack:
         self._soft_rows()
         self._joint_box()
         self._polygon()
-<<<<<<< HEAD
         self._clearance()
-=======
         self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
->>>>>>> main
 
     def _hard_rows(self) -> None:
         rows, nf = self.rows, len(self.free)
@@ -164,7 +138,7 @@ class Stack:
         """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
-        # A base on its feet moves by the legs that it stands on: their length is its lever arm.
+        # A base on its feet moves by the legs that it stands on.
         held = (t for t in self.phase.frame_targets if t.hard)
         standing = max((reach(model, t.frame) for t in held), default=0.0)
         for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
@@ -303,6 +277,14 @@ class Stack:
     def soft_damping(self) -> float:
         """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
         return REGULARISATION + self.phase.damping + float(np.abs(self._soft_error) @ self._curvature)
+
+    def relax(self) -> bool:
+        """Ask what is outside its limits only not to go further out; False where that changes nothing."""
+        before = self.d.copy()
+        np.maximum(self._edges[1], 0.0, out=self._edges[1])
+        if self.clearance is not None:
+            self.clearance.relax(self.kinematics.jacobian, *self._near)
+        return not np.array_equal(before, self.d)
 
     def linearise(self, *, recovering: bool) -> None:
         """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves.

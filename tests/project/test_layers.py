@@ -29,6 +29,7 @@ LAYERS = [
     "aims",
     "compiled",
     "kinematics",
+    "blocks",
     "collision",
     "kernels",
     "sampling",

@@ -34,7 +34,7 @@ def keep_apart(stack: Stack, step: Array) -> Array:
         return step
     for patient in (False, True):  # what is too near need not move apart, if it cannot
         if patient:
-            np.maximum(stack.d, 0.0, out=stack.d)
+            stack.relax()
         qp = proxsuite.proxqp.dense.QP(len(stack.g), len(stack.b), len(stack.d), True)
         qp.settings.eps_abs = 1e-9
         qp.settings.max_iter = 2000

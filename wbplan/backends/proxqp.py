@@ -59,7 +59,7 @@ class ProxqpBackend:
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
-        if not (self._run() or self._retry() or (self._wait_for_margin() and self._retry())):
+        if not (self._run() or self._retry() or (s.relax() and self._retry())):
             raise solve_error(s, "the QP has no solution")
         results, rows = self._qp.results, len(s.d)
         found = Multipliers(np.array(results.y), np.array(results.z[:rows]), np.array(results.z[rows:]))
@@ -76,12 +76,6 @@ class ProxqpBackend:
         qp.solve()
         # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
         return bool(qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
-
-    def _wait_for_margin(self) -> bool:
-        """Ask a CoM that is outside its margin only not to go further out; False where none is."""
-        outside = bool((self._stack.d < 0.0).any())
-        np.maximum(self._stack.d, 0.0, out=self._stack.d)
-        return outside
 
     def _retry(self) -> bool:
         """Once more from nothing, with patience: a warm start may be a bad one."""

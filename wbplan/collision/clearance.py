@@ -252,6 +252,14 @@ class Clearance:
         least = np.full(len(self.spare), -RECOVERY * self._dt)
         self._fill(jacobian, free, driven, step, C, d, nothing, SHARE, least)
 
+    def relax(
+        self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float
+    ) -> None:
+        """The rows without reserve, for a tick that has no step within it: none gets nearer than promised."""
+        self._fill(
+            jacobian, free, driven, step, C, d, nothing, 1.0, np.zeros(len(self.spare)), self.model.bound
+        )
+
     def linearise(
         self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float
     ) -> None:
@@ -261,11 +269,12 @@ class Clearance:
 
     def _fill(
         self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float,
-        share: float, least: Array,
+        share: float, least: Array, bound: Array | None = None,
     ) -> None:  # fmt: skip
+        bound = self._reserved if bound is None else bound
         kernels.fill(
             jacobian, self._moves, self._joint_a, self._joint_b, free, driven, step, self._key, self._pair,
-            *self._world, self._towards, self._gap, self._reserved, share, least, nothing, C, d,
+            *self._world, self._towards, self._gap, bound, share, least, nothing, C, d,
         )  # fmt: skip
 
     # -- names -------------------------------------------------------------------------------------------
