@@ -32,6 +32,7 @@ BACK = -0.06  # where the body is kept [m] along y while the arms are ahead of i
 TALL = 0.29  # body height [m] for stepping: lower down, the shanks' limit leaves feet no room to rise
 STEP = 0.03  # how high feet rise [m]
 CLEARANCE = 0.005  # [m], of all that is not meant to touch
+INFLUENCE = 0.02  # [m], within which things are held apart; further ones are not reached in a tick
 # An arm that is folded lies in its own shank, as it is built: there its links are 2 to 4 mm apart, and its
 # jaws pass the knee at 4.9 mm.
 FOLDED = tuple(
@@ -90,8 +91,8 @@ def script(
         return [
             wb.JointLimits(speed=0.8),
             wb.SupportPolygon(margin=margin),
-            wb.SelfCollision(CLEARANCE, except_for=FOLDED),
-            wb.Obstacles([ground], CLEARANCE, except_for=tuple(touching)),
+            wb.SelfCollision(CLEARANCE, INFLUENCE, except_for=FOLDED),
+            wb.Obstacles([ground], CLEARANCE, INFLUENCE, except_for=tuple(touching)),
         ]
 
     def phase(

@@ -51,13 +51,13 @@ def rows(bundle: Bundle, replay: Replay, folders: tuple[Path, ...] = ()) -> list
     try:
         solids = Solids(bundle, folders)
     except Unreadable as error:
-        at = replay.times(promising[0].samples[:1])
-        clear.see([np.nan], promising[0].promises["clearance"], at, promising[0].name, [str(error)])
-        return clear.rows()
+        return _cannot(replay, promising[0], str(error))
+    nothing = True
     for window in promising:
         pairs = _pairs(solids, bundle, window)
         if not len(pairs.first):
             continue
+        nothing = False
         found = np.empty((len(window.samples), len(pairs.first)))
         for i, k in enumerate(window.samples):
             solids.place(int(k))
@@ -70,7 +70,15 @@ def rows(bundle: Bundle, replay: Replay, folders: tuple[Path, ...] = ()) -> list
         for worst, chosen in ((clear, pairs.promised), (touch, ~pairs.promised)):
             these = np.flatnonzero(chosen)
             worst.see(found[:, these], bound[these], times, window.name, [names[p] for p in these])
+    if nothing:  # a promise must not pass because there was nothing to look at
+        return _cannot(replay, promising[0], "there are no shapes to measure")
     return [*clear.rows(), *touch.rows()]
+
+
+def _cannot(replay: Replay, window: Window, why: str) -> list[Row]:
+    clear = Worst("clearance", "m", at_least=True)
+    clear.see([np.nan], window.promises["clearance"], replay.times(window.samples[:1]), window.name, [why])
+    return clear.rows()
 
 
 def _pairs(solids: Solids, bundle: Bundle, window: Window) -> _Pairs:

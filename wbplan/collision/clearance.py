@@ -43,7 +43,7 @@ SHARE = 0.5
 RESERVE = 1e-4
 
 #: Tolerance [m] of the distances.
-PRECISE = 1e-9
+PRECISE = 1e-6
 
 #: Speed [m/s] at which a pair that is too near is moved apart.
 RECOVERY = 0.05

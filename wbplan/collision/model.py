@@ -95,6 +95,8 @@ def robot_shapes(robot: Robot, model: Any) -> Any:
             mesh.set("filename", str(robot.mesh_path(mesh.get("filename", ""))))
     text = ElementTree.tostring(root, encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    if not geometry.ngeoms:
+        raise SpecError(f"robot '{robot.name}': no link has a collision shape; no clearance can be kept")
     for item in geometry.geometryObjects:
         if isinstance(item.geometry, coal.BVHModelBase):
             if not item.geometry.buildConvexHull(True, "Qt"):
@@ -107,7 +109,8 @@ def collision_model(compiled: CompiledPhase) -> CollisionModel:
     """Shapes and pairs of a phase.
 
     Raises:
-        SpecError: a name of `except_for` is neither a frame nor a body, or a mesh has no volume.
+        SpecError: a name of `except_for` is neither a frame nor a body, a mesh has no volume, or the robot has
+            no shapes.
     """
     return _Builder(compiled).build()
 
