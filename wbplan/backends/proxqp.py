@@ -40,6 +40,8 @@ class ProxqpBackend:
         qp.settings.eps_abs = 1e-8
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
+        # Steps are millimetres: by its usual measure the solver takes near rows that agree for contradictions.
+        qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = 1e-14
         qp.settings.max_iter = 200
         qp.settings.check_duality_gap = False
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.

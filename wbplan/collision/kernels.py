@@ -178,7 +178,7 @@ def remember(
                 f = k
                 break
         if f < 0:
-            key[s] = -1
+            key[s] = -2
             continue
         p = pair[s]
         _to_world(rotations, places, first[p], local_a[s], world_a[s])
@@ -191,7 +191,7 @@ def remember(
             slid += (world_b[s, i] - world_a[s, i] - g * normal[f, i]) ** 2
         gap[s] = g
         if g > influence[p] or slid > SLID * SLID:
-            key[s] = -1
+            key[s] = -2
     for f in range(count):
         p = pairs[f]
         if distance[f] > influence[p]:
@@ -199,7 +199,7 @@ def remember(
         into, of_pair, widest, free, loosest = -1, 0, -1, -1, -1
         for s in range(key.shape[0]):
             if key[s] < 0:
-                if free < 0:
+                if free < 0 or key[s] > key[free]:  # not one that was another pair's until now
                     free = s
                 continue
             if loosest < 0 or gap[s] - bound[pair[s]] > gap[loosest] - bound[pair[loosest]]:
@@ -231,6 +231,8 @@ def remember(
         local_a[into] = point
         _to_local(rotations, places, second[p], on_second[f], point)
         local_b[into] = point
+    for s in range(key.shape[0]):
+        key[s] = max(key[s], -1)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

@@ -109,8 +109,8 @@ def collision_model(compiled: CompiledPhase) -> CollisionModel:
     """Shapes and pairs of a phase.
 
     Raises:
-        SpecError: a name of `except_for` is neither a frame nor a body, a mesh has no volume, or the robot has
-            no shapes.
+        SpecError: a name of `except_for` is neither a frame nor a body, a mesh has no volume, or the robot
+            has no shapes.
     """
     return _Builder(compiled).build()
 
