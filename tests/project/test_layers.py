@@ -29,6 +29,7 @@ LAYERS = [
     "sampling",
     "rows",
     "posture",
+    "levels",
     "stack",
     "diagnose",
     "qp",
