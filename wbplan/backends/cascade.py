@@ -93,7 +93,7 @@ def _reduce(
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _held(left: Any, rhs: Any, pulls: Any, missed: Any, short: Any) -> float:
-    """How far a level counts as held back, 0 to 1, that leaves so much of its rows undone: by its worst row."""
+    """How far a level counts as held back, 0 to 1, that leaves so much undone: by its worst row."""
     worst = 0.0
     for r in range(left.shape[0]):
         way = abs(left[r]) / max(abs(rhs[r]), 1e-12)
@@ -193,21 +193,25 @@ class Cascade:
             return None
         # One share for the level: what its rows and the fixed ones do to each other has to cancel.
         beyond = self._beyond(k, level, left, x, multipliers)
-        share = _held(beyond, level.rhs, level.pulls, MISSED, SHORT)
+        share: float = _held(beyond, level.rhs, level.pulls, MISSED, SHORT)
         if share == 0.0:
             return None
-        hard, first = stack.rows.hard, sum(len(above.rows) for above in stack.levels[:k])
-        unit = np.eye(len(x))[np.concatenate([np.zeros(0, dtype=np.intp), *self._above[:k]])]
-        fixed = np.vstack([stack.A, *(above.rows for above in stack.levels[:k]), unit])
+        hard, first = stack.rows.hard, sum(len(level.rows) for level in stack.levels[:k])
+        joints = np.concatenate([np.flatnonzero(np.abs(multipliers.box) > ROUNDING), *self._above[:k]])
+        edges = np.flatnonzero(multipliers.rows > ROUNDING)
+        above = (level.rows for level in stack.levels[:k])
+        fixed = np.vstack([stack.A, *above, stack.C[edges], np.eye(len(x))[joints]])
         # Damping belongs to the step and not to where the level is best.
         slope = level.H @ x + level.g - (level.damping + REGULARISATION) * x
-        slope += stack.C.T @ multipliers.rows + multipliers.box
         forces = np.linalg.lstsq(fixed.T, -slope, rcond=DEPENDENT)[0]
+        pushes = np.zeros(len(stack.d))
+        pushes[edges] = forces[stack.n_hard + first : stack.n_hard + first + len(edges)]
         coefficients = np.zeros(len(stack.rows.chosen))
         coefficients[:hard] = forces[:hard]
         coefficients[hard : hard + first] = forces[stack.n_hard : stack.n_hard + first]
         coefficients[hard + first : hard + first + len(left)] = -(level.weight**2) * left
-        return share * self._curvature.of(coefficients, multipliers.rows[: len(stack.normals)])
+        bent: Array = self._curvature.of(coefficients, pushes[: len(stack.normals)])
+        return share * bent
 
     def _beyond(self, k: int, level: Level, left: Array, x: Array, multipliers: Multipliers) -> Array:
         """(s,) the part of what is left undone that no step of `STEP` or less can mend."""
