@@ -15,7 +15,6 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 
 from wbplan import kernels
 from wbplan.ascent import Ascent
+from wbplan.blocks import RowBlock
 from wbplan.compiled import CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
 from wbplan.levels import Level
@@ -41,24 +41,6 @@ MARGIN_RESERVE = 1e-4
 
 #: Stands for no bound in the QP.
 UNBOUNDED = 1e20
-
-
-@final
-@dataclass(frozen=True)
-class RowBlock:
-    """Inequality rows of one kind: consecutive rows of C.
-
-    Attributes:
-        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
-        span: where its rows stand.
-        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
-            gives one name a row, '' for a row that is not in use.
-    """
-
-    kind: str
-    unit: str
-    span: slice
-    keep: Callable[[], Callable[[], list[str]]]
 
 
 @final

@@ -35,6 +35,7 @@ LAYERS = [
     "rows",
     "posture",
     "levels",
+    "blocks",
     "ascent",
     "stack",
     "diagnose",

@@ -47,6 +47,12 @@ MISSED, SHORT = (0.2, 0.5), (5e-6, 5e-5)
 #: A step [rad] beyond which rows say nothing: what would take a longer one to mend is out of reach.
 STEP = 2.0
 
+#: Multipliers below this share of a level's pull are not counted as holding it back.
+FAINT = 1e-6
+
+#: Fixed rows that are shorter than this share of the longest push no level by way of their curvature.
+VANISHING = 1e-2
+
 #: How often the active bounds are mended before a solver is asked.
 MENDED = 12
 
@@ -197,13 +203,14 @@ class Cascade:
         if share == 0.0:
             return None
         hard, first = stack.rows.hard, sum(len(level.rows) for level in stack.levels[:k])
-        joints = np.concatenate([np.flatnonzero(np.abs(multipliers.box) > ROUNDING), *self._above[:k]])
-        edges = np.flatnonzero(multipliers.rows > ROUNDING)
+        faint = FAINT * float(np.abs(level.g).max())
+        joints = np.concatenate([np.flatnonzero(np.abs(multipliers.box) > faint), *self._above[:k]])
+        edges = np.flatnonzero(multipliers.rows > faint)
         above = (level.rows for level in stack.levels[:k])
         fixed = np.vstack([stack.A, *above, stack.C[edges], np.eye(len(x))[joints]])
         # Damping belongs to the step and not to where the level is best.
         slope = level.H @ x + level.g - (level.damping + REGULARISATION) * x
-        forces = np.linalg.lstsq(fixed.T, -slope, rcond=DEPENDENT)[0]
+        forces = np.linalg.lstsq(fixed.T, -slope, rcond=VANISHING)[0]
         pushes = np.zeros(len(stack.d))
         pushes[edges] = forces[stack.n_hard + first : stack.n_hard + first + len(edges)]
         coefficients = np.zeros(len(stack.rows.chosen))
