@@ -24,7 +24,8 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors"}  #: prefix in the file -> field
+#: Prefix in the file -> field.
+GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 MOST = 1e12  #: no length, time, mass or speed of a plan comes near this; squares of larger numbers overflow
@@ -102,6 +103,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
         array = _array(motion, key)
@@ -109,7 +111,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
             raise BundleError(f"{where}: {key}: expected shape {shape}, found {array.shape}")
         if key == "phase" and array.dtype.kind not in "iu":
             raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
-        # A margin, object, target or error may be absent at a sample; all else is there or broken.
+        # A margin, object, target, error or measure may be absent at a sample; all else is there or broken.
         if values and key in ("time", "q", "v", "com") and not (np.abs(array) <= MOST).all():
             at = tuple(int(i) for i in np.argwhere(~(np.abs(array) <= MOST))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
@@ -257,6 +259,8 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for pad in item["pads"].items() if "pads" in item else ():
+            pad.frame(model)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:
