@@ -85,11 +85,10 @@ def _png(drawing: Figure) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     file = io.BytesIO()
-    # Without the version in it the same plan makes the same file.
     canvas: Any = FigureCanvasAgg(drawing)
-    with warnings.catch_warnings():  # absurd numbers make labels that leave no room; that is no one's mistake
+    with warnings.catch_warnings():  # labels of absurd numbers leave no room
         warnings.simplefilter("ignore", UserWarning)
-        canvas.print_png(file, metadata={"Software": None})
+        canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
     return file.getvalue()
 
 
@@ -231,8 +230,8 @@ def _errors(axes: Axes, bundle: Bundle, parts: tuple[str, ...], unit: str) -> No
         if name.startswith("contact("):
             contacts.append(values)
         elif name in colors:
-            label, style = (name, "-") if part == parts[0] else (f"{name}, {part}", "--")
-            axes.plot(time, drawn, style, color=colors[name], linewidth=1.3, label=_short(label, 40))
+            said, style = (name, "-") if part == parts[0] else (f"{name}, {part}", "--")
+            axes.plot(time, drawn, style, color=colors[name], linewidth=1.3, label=_short(said, 40))
         else:
             rest += 1
             axes.plot(time, drawn, color="#c3cbd2", linewidth=0.8, zorder=1)
@@ -301,9 +300,7 @@ def _joints(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
     else:
         starts = [row for row in rows[:-1] if row == 0 or limbs[row] != limbs[row - 1]]
         ends = [*starts[1:], len(names)]
-        axes.set_yticks(
-            [(a + b) / 2 for a, b in zip(starts, ends, strict=True)], [_short(limbs[a], 24) for a in starts]
-        )
+        axes.set_yticks(np.add(starts, ends) / 2, [_short(limbs[a], 24) for a in starts])
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
     for edge in [phase["start"] for phase in bundle.phases[1:]]:

@@ -106,9 +106,8 @@ def test_numbers_that_are_none(make, bad):
     only(pair(make, more=f'<dynamics damping="{bad}"/>'), f"joint 'j': dynamics damping is '{bad}'")
 
 
-@pytest.mark.parametrize("number", ["1e200", "-1e13"])
-def test_a_number_that_no_robot_has(make, number):
-    only(pair(make, xyz=f"0 0 {number}"), "joint 'j': origin xyz", "expected nothing beyond 1e+12")
+def test_a_number_that_no_robot_has(make):
+    only(pair(make, xyz="0 0 -1e13"), "joint 'j': origin xyz", "expected nothing beyond 1e+12")
 
 
 def test_a_mesh_whose_name_no_file_can_have(make):
