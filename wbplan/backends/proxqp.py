@@ -42,7 +42,7 @@ class ProxqpBackend:
         qp.settings.eps_abs = 1e-8
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
-        qp.settings.max_iter = 200
+        qp.settings.max_iter = qp.settings.max_iter_in = 200  # inner ones go to 1500 for each outer otherwise
         qp.settings.check_duality_gap = False
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
         qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
@@ -92,5 +92,5 @@ class ProxqpBackend:
     def _retry(self) -> bool:
         """Once more from nothing, with patience: a warm start may be a bad one."""
         self._qp, self._started = self._new_solver(), False
-        self._qp.settings.max_iter = 2000
+        self._qp.settings.max_iter = 1000
         return self._run()
