@@ -1,4 +1,4 @@
-"""Inequality rows of the tick in blocks, each with what it is called in reports."""
+"""What the inequality rows of a tick's program are, by block: kind, unit and names."""
 
 from __future__ import annotations
 
