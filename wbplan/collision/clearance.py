@@ -157,17 +157,10 @@ class Clearance:
         else:
             nearest = self._nearest
         self.spare[:] = np.inf
-        kernels.gather(
-            nearest,
-            found,
-            model.bound,
-            self._keys,
-            self._of,
-            self._distance,
-            self._normal,
-            self._points,
-            self.spare,
-        )
+        least = kernels.gather(
+            nearest, found, model.bound, self._keys, self._of, self._distance, self._normal, self._points,
+            self.spare, model.promised,
+        )  # fmt: skip
         for p, shape, field in self._on_fields:
             self._measure_field(p, shape, self._fields[field], field)
         self.checked = self._count
@@ -175,15 +168,17 @@ class Clearance:
         if self._places_all is not self._places:
             self._places_all[: len(self._places)] = self._places
             self._rotations_all[: len(self._places)] = self._rotations
-        kernels.remember(
+        self.active = kernels.remember(
             self._rotations_all, self._places_all, count, self._keys, self._of, model.first, model.second,
             self._distance, self._normal, *self._points, model.influence, model.bound, self._key, self._pair,
             *self._local, *self._world, self._towards, self._gap,
         )  # fmt: skip
-        self.active = int((self._key >= 0).sum())
         if self._still is None:
             self._still = self._measure_still()
-        self.least = min(kernels.least(self.spare, model.bound, model.promised), self._still_least)
+        for p, _, _ in self._on_fields:
+            if model.promised[p]:
+                least = min(least, self.spare[p] + model.bound[p])
+        self.least = float(min(least, self._still_least))
 
     def _note(self, key: int, pair: int, result: Any) -> None:
         """One measured distance; the spare of a pair is that of its nearest points."""

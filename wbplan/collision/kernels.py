@@ -13,6 +13,9 @@ SAME = 0.004
 #: Remembered points that have slid this far [m] past each other are forgotten.
 SLID = 0.02
 
+#: Rows that differ by less than this [m/rad or 1] everywhere are one.
+ALIKE = 1e-6
+
 #: Most remembered points of one pair.
 MOST = 4
 
@@ -101,9 +104,14 @@ def near(
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def gather(
     nearest: Any, found: Any, bound: Any, keys: Any, pairs: Any, distance: Any, normal: Any, points: Any,
-    spare: Any,
-) -> None:  # fmt: skip
-    """Takes the results (P, 9), normal and points, of the pairs that were found."""
+    spare: Any, promised: Any,
+) -> float:  # fmt: skip
+    """Takes the results (P, 9), normal and points, of the pairs that were found.
+
+    Returns:
+        The least distance of those that promise one.
+    """
+    least = np.inf
     for k in range(found.shape[0]):
         p = found[k]
         keys[k] = pairs[k] = p
@@ -114,16 +122,9 @@ def gather(
             gap += nearest[p, i] * (nearest[p, 6 + i] - nearest[p, 3 + i])
         distance[k] = gap
         spare[p] = gap - bound[p]
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def least(spare: Any, bound: Any, promised: Any) -> float:
-    """The least distance of the pairs that promise one."""
-    found = np.inf
-    for p in range(spare.shape[0]):
         if promised[p]:
-            found = min(found, spare[p] + bound[p])
-    return found
+            least = min(least, gap)
+    return least
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -158,7 +159,7 @@ def remember(
     rotations: Any, places: Any, count: int, keys: Any, pairs: Any, first: Any, second: Any, distance: Any,
     normal: Any, on_first: Any, on_second: Any, influence: Any, bound: Any, key: Any, pair: Any, local_a: Any,
     local_b: Any, world_a: Any, world_b: Any, towards: Any, gap: Any,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Brings the slots up to date with the nearest points that were just found.
 
     A slot keeps its pair as long as that is near, and its points, seen from their own links, as long as they
@@ -167,6 +168,9 @@ def remember(
 
     Of what was found: `count`, `keys`, `pairs`, `distance`, `normal`, `on_first`, `on_second`. Of the slots:
     `key` (-1 where one is free), `pair`, `local_a`, `local_b`, `world_a`, `world_b`, `towards`, `gap`.
+
+    Returns:
+        How many slots are in use.
     """
     point = np.zeros(3)
     for s in range(key.shape[0]):
@@ -231,8 +235,11 @@ def remember(
         local_a[into] = point
         _to_local(rotations, places, second[p], on_second[f], point)
         local_b[into] = point
+    used = 0
     for s in range(key.shape[0]):
         key[s] = max(key[s], -1)
+        used += key[s] >= 0
+    return used
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -280,3 +287,20 @@ def fill(
         if size < 1e-12:  # no free joint moves the pair: a row could only forbid what nothing can change
             C[s, :] = 0.0
             d[s] = nothing
+    for s in range(key.shape[0]):  # of rows that are alike the tightest counts: two would make one too many
+        if d[s] >= nothing:
+            continue
+        for r in range(s):
+            if d[r] >= nothing:
+                continue
+            alike = True
+            for c in range(free.shape[0]):
+                if abs(C[s, c] - C[r, c]) > ALIKE:
+                    alike = False
+                    break
+            if alike:
+                loose = s if d[s] >= d[r] else r
+                C[loose, :] = 0.0
+                d[loose] = nothing
+                if loose == s:
+                    break
