@@ -287,7 +287,7 @@ def fill(
         if size < 1e-12:  # no free joint moves the pair: a row could only forbid what nothing can change
             C[s, :] = 0.0
             d[s] = nothing
-    for s in range(key.shape[0]):  # of rows that are alike the tightest counts: two would make one too many
+    for s in range(key.shape[0]):  # rows that are alike are one, with the lesser bound
         if d[s] >= nothing:
             continue
         for r in range(s):
@@ -299,8 +299,7 @@ def fill(
                     alike = False
                     break
             if alike:
-                loose = s if d[s] >= d[r] else r
-                C[loose, :] = 0.0
-                d[loose] = nothing
-                if loose == s:
-                    break
+                d[r] = min(d[r], d[s])
+                C[s, :] = 0.0
+                d[s] = nothing
+                break
