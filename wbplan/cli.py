@@ -135,6 +135,9 @@ def run(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the task; may be repeated."),
     ] = None,
+    robot_name: Annotated[
+        str | None, typer.Option("--robot", metavar="ROBOT", help="Another robot, if the task takes others.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Serve the plan in Meshcat until Ctrl-C.")] = False,
 ) -> None:
     """Plan a task, write its bundle, and check every promise of it."""
@@ -143,7 +146,7 @@ def run(
     folder = out if out is not None else Path("out") / file.name
     _require_place(folder)
 
-    robot = load_robot(file.robot)
+    robot = load_robot(file.robot_for(robot_name))
     script = file.script(robot, values)
     with _live_view(robot, script, view) as observe, _progress_bar(file.name) as progress:
         planned = plan(

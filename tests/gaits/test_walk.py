@@ -29,7 +29,7 @@ def test_distance_and_speed_are_the_gaits(robot: str) -> None:
     _, _, stroke, step_time, _ = ROBOTS[robot]
     done = walked(robot, "tripod", 2.0)
     assert done.gait is not None
-    assert done.speed == pytest.approx(done.gait.speed(stroke, 2 * step_time), abs=1e-6)
+    assert done.speed == pytest.approx(done.gait.speed(stroke, done.gait.cycle * step_time), abs=1e-6)
     plan = wb.plan(done.robot, done.script)
     report = plan.check()
     assert report.ok, [row for row in report.rows if not row.held]

@@ -1,13 +1,15 @@
 """Walking: gaits as data, their margins and speeds, stances, swings, tracks, and phases made of them."""
 
+from wbplan.gaits.building import Manner, Walk, build
 from wbplan.gaits.gait import Gait
 from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
 from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
+from wbplan.gaits.reach import room, roomiest
 from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
 from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.gaits.tracks import Track, arc, on_the_spot, straight, through
-from wbplan.gaits.walking import Manner, Walk, build, walk
+from wbplan.gaits.walking import gait_for, walk
 
 __all__ = [
     "ANT",
@@ -37,6 +39,7 @@ __all__ = [
     "crawls",
     "cycle_margins",
     "flat",
+    "gait_for",
     "gait_named",
     "gaits_of",
     "mode_named",
@@ -47,6 +50,8 @@ __all__ = [
     "quadrangular",
     "regular_stance",
     "require",
+    "room",
+    "roomiest",
     "schedule",
     "step_margins",
     "straight",
