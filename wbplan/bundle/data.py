@@ -34,6 +34,7 @@ class Trajectory:
             nan while it has none.
         targets: task name -> (N, 7) the pose that it was asked for, world; nan where it was not.
         errors: "<task>.position" [m], "<task>.orientation" [rad] ... -> (N,); nan where absent.
+        measures: "<task>.manipulability" [-] -> (N,); nan where absent.
     """
 
     time: Array
@@ -46,6 +47,7 @@ class Trajectory:
     bodies: Mapping[str, Array] = field(default_factory=dict)
     targets: Mapping[str, Array] = field(default_factory=dict)
     errors: Mapping[str, Array] = field(default_factory=dict)
+    measures: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -213,4 +215,5 @@ def _trajectory(arrays: Mapping[str, NDArray[Any]], where: str) -> Trajectory:
         bodies=groups["bodies"],
         targets=groups["targets"],
         errors=groups["errors"],
+        measures=groups["measures"],
     )

@@ -24,7 +24,8 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors"}  #: prefix in the file -> field
+#: Prefix in the file -> field.
+GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 EDGE = 1e-9  #: [s], two times nearer than this are one
@@ -94,6 +95,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
         array = _array(motion, key)
@@ -101,7 +103,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
             raise BundleError(f"{where}: {key}: expected shape {shape}, found {array.shape}")
         if key == "phase" and array.dtype.kind not in "iu":
             raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
-        # A margin, object, target or error may be absent at a sample; all else is there or broken.
+        # A margin, object, target, error or measure may be absent at a sample; all else is there or broken.
         if values and key in ("time", "q", "v", "com") and not np.isfinite(array).all():
             at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
