@@ -49,8 +49,8 @@ def script(
         cycles: see `distance`.
         heading: of travel, against the mode's direction [degrees].
         turn: of the body by the end of the path [degrees].
-        stroke: how far a foot goes in the body's frame while it stands [m]; most of what legs can where not
-            given, and half the body's height at most.
+        stroke: how far a foot goes in the body's frame while it stands [m]; six tenths of what they can where
+            not given, and half the body's height at most.
         step_time: of a step [s]; as short as joints' speeds allow where not given.
         lift: how high feet rise [m]; a tenth of the body's height where not given.
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
@@ -62,10 +62,8 @@ def script(
     way = wb.gaits.mode_named(mode)
     stance = walker.stance(lean=way.lean, radius=radius, height=height)
     rise = 0.1 * stance.height if lift is None else lift
-    if height is None and wb.gaits.room(walker, stance, rise) < 0.1 * stance.height:
-        stance = wb.gaits.roomiest(walker, stance, rise)
-    if stroke is None:
-        stroke = min(0.6 * wb.gaits.room(walker, stance, rise), 0.5 * stance.height)
+    stance, easy = wb.gaits.comfortable(walker, stance, rise, adjust=height is None)
+    stroke = easy if stroke is None else stroke
     course = way.heading + math.radians(heading)
     made = wb.gaits.gait_for(walker, gait, stance, course, stroke)
     length = cycles * made.stride(stroke) if distance is None else distance

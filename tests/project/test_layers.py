@@ -49,6 +49,7 @@ LAYERS = [
     "physics",
     "recorder",
     "planner",
+    "survey",
     "taskfile",
     "papers",
     "bench",

@@ -1,10 +1,12 @@
 """Walking: gaits as data, their margins and speeds, stances, swings, tracks, and phases made of them."""
 
 from wbplan.gaits.building import Manner, Walk, build
+from wbplan.gaits.figures import cycle_figure
 from wbplan.gaits.gait import Gait
+from wbplan.gaits.ground import firm, over
 from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
 from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
-from wbplan.gaits.reach import room, roomiest
+from wbplan.gaits.reach import comfortable, room, roomiest
 from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
 from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
@@ -35,15 +37,19 @@ __all__ = [
     "beats_of",
     "best_margin",
     "build",
+    "comfortable",
     "course_of",
     "crawls",
+    "cycle_figure",
     "cycle_margins",
+    "firm",
     "flat",
     "gait_for",
     "gait_named",
     "gaits_of",
     "mode_named",
     "on_the_spot",
+    "over",
     "pentagon",
     "pentapod",
     "possible",

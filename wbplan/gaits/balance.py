@@ -17,8 +17,8 @@ from wbplan.geometry import HalfPlanes
 
 Array = NDArray[np.float64]
 
-#: Kept beyond the margin asked [m]: the curve is checked at points only.
-SPARE = 5e-4
+#: Kept beyond the margin asked [m], for what ticks are off the curve by.
+SPARE = 1e-3
 #: Spline pieces in a step, and points in each at which the margin is asked for.
 PIECES, POINTS = 4, 4
 
@@ -144,7 +144,7 @@ def sway(
     spline = BSpline(full, coefficients, 3)
     moved = places + spline(times)
     least = np.concatenate([s.polygon.margins(moved[which == k]) for k, s in enumerate(stays)])
-    return Sway(nominal, spline, _least(least, which)) if least.min() >= margin - SPARE else None
+    return Sway(nominal, spline, _least(least, which)) if least.min() >= margin else None
 
 
 def _points(stays: Sequence[Stay]) -> tuple[Array, NDArray[np.intp]]:

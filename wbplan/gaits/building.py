@@ -42,8 +42,8 @@ class Manner:
     """How a robot walks, whatever the gait.
 
     Args:
-        step_time: of the longest swing [s]; as short as seven tenths of the joints' speed and gentle feet allow
-            where not given.
+        step_time: of the longest swing [s]; as short as seven tenths of the joints' speed and gentle feet
+            allow where not given.
         height: how high feet are lifted over the higher end of their way [m].
         clearance: least height of a foot over the ground in the middle half of its way [m].
         margin: stability margin kept all through [m]; 0.6 of the largest where not given.
@@ -225,7 +225,7 @@ def build(
     for step, paths in zip(steps, swings, strict=True):
         places = Excerpt(motion.raised, step.begin, step.duration, motion.yaw)
         tasks: list[Task] = [
-            ComTask(Excerpt(com_points, step.begin, step.duration), weight=(100.0, 100.0, 0.0)),
+            ComTask(Excerpt(com_points, step.begin, step.duration), weight=(100.0, 100.0, 0.0), gain=50.0),
             PoseTask(walker.root, places, weight=((0.0, 0.0, 100.0), 50.0)),
         ]
         phases.append(

@@ -146,3 +146,21 @@ def roomiest(walker: Walker, stance: Stance, lift: float) -> Stance:
     heights = stance.height * np.arange(0.8, 1.31, 0.05)
     found = [(room(walker, Stance(stance.feet, float(h)), lift), float(h)) for h in heights]
     return Stance(stance.feet, max(found)[1])
+
+
+def comfortable(walker: Walker, stance: Stance, lift: float, *, adjust: bool = True) -> tuple[Stance, float]:
+    """A stance and a stroke [m] that legs make with ease.
+
+    The stroke is six tenths of the room that there is, and half the body's height at most.
+
+    Args:
+        walker: the legs.
+        stance: of the feet.
+        lift: height of the swing [m].
+        adjust: the body may be higher or lower where legs have next to no room at the stance.
+    """
+    stroke = room(walker, stance, lift)
+    if adjust and stroke < 0.1 * stance.height:
+        stance = roomiest(walker, stance, lift)
+        stroke = room(walker, stance, lift)
+    return stance, min(0.6 * stroke, 0.5 * stance.height)

@@ -28,6 +28,8 @@ PACE = 0.7
 GENTLE = 2.5
 #: Step times are whole numbers of these [s], so that phases end on ticks.
 GRAIN = 0.04
+#: Strides of the walks by which a shorter stride is looked for.
+TRIED = 2.5
 
 
 def walk(
@@ -74,9 +76,10 @@ def walk(
 
     def planned(share: float, manner: Manner, known: Walk | None = None) -> Walk:
         stride = gait.stride(share * stroke)
-        beats = beats_of(gait, count_for(gait, track.length, stride))
+        course = track if share == 1.0 else Track(min(track.length, TRIED * stride), track.curve)
+        beats = beats_of(gait, count_for(gait, course.length, stride))
         speed = stride / (gait.cycle * manner.beat)
-        made = schedule(beats, stance, track, manner.beat, ground, place, speed)
+        made = schedule(beats, stance, course, manner.beat, ground, place, speed)
         return build(walker, made, stance, manner, ground, fields, known)
 
     try:
@@ -132,13 +135,13 @@ def _with_a_way_out(error: GaitError, planned: Callable[[float], Walk], stride: 
     if error.stride is not None or "step_time" in str(error):
         return error
     low, high = 0.0, 1.0
-    for share in (0.02, 0.5):
+    for share in (0.05, 0.5):
         if _holds(planned, share):
             low = share
         else:
             high = share
             break
-    while high - low > 0.02 and low > 0.0:
+    while high - low > 0.03 and low > 0.0:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _holds(planned, middle) else (low, middle)
     way = (
