@@ -1,7 +1,7 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
 from wbplan.active import Active
-from wbplan.bodies import Body, Carried
+from wbplan.bodies import Body, Carried, Grip
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.contacts import Contact, Push
@@ -15,7 +15,7 @@ from wbplan.errors import (
     ViewError,
     WbplanError,
 )
-from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
 from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
@@ -50,6 +50,8 @@ __all__ = [
     "Curve",
     "Cylinder",
     "DampingTask",
+    "Forces",
+    "Grip",
     "Ground",
     "HeightField",
     "Hold",

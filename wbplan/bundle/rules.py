@@ -24,7 +24,9 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors"}  #: prefix in the file -> field
+OPTIONAL = ("torque", "push")
+#: prefix in the file -> field
+GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "force": "forces", "moment": "moments"}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 EDGE = 1e-9  #: [s], two times nearer than this are one
@@ -94,6 +96,10 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"force_{name}": (samples, 3) for name in motion.forces},
+        **{f"moment_{name}": (samples, 3) for name in motion.moments},
+        **({} if motion.torque is None else {"torque": (samples, model.nv - 6)}),
+        **({} if motion.push is None else {"push": (samples,)}),
     }
     for key, shape in shapes.items():
         array = _array(motion, key)
@@ -248,6 +254,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for key in ("friction", "patch", "squeeze"):
+            if key in item:
+                item[key].number(0.0)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:
@@ -255,6 +264,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
     for push in phase["pushes"].items() if "pushes" in phase else ():
         push["frame"].frame(model)
         push["force"].vector(3)
+    for key in ("friction_use", "torque_use"):
+        if key in phase:
+            phase[key].number(0.0)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 

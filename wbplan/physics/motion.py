@@ -33,6 +33,7 @@ class Span:
         end: [s].
         pads: the frames that press on it; one where it is not clamped.
         friction: of the pads, where the plan says it.
+        squeeze: [N], likewise.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Span:
     end: float
     pads: tuple[str, ...]
     friction: float | None
+    squeeze: float | None = None
 
 
 @final
@@ -166,9 +168,11 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
             start, end = float(phase["start"]) - origin, float(phase["end"]) - origin
             last = next((s for s in reversed(spans) if s.name == item["name"]), None)
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
-                spans[spans.index(last)] = Span(last.name, last.start, end, last.pads, last.friction)
+                spans[spans.index(last)] = Span(
+                    last.name, last.start, end, last.pads, last.friction, last.squeeze
+                )
             else:
-                spans.append(Span(item["name"], start, end, pads, item.get("friction")))
+                spans.append(Span(item["name"], start, end, pads, item.get("friction"), item.get("squeeze")))
     return tuple(spans)
 
 
@@ -180,11 +184,13 @@ def grip_of(span: Span, friction: Array, options: Options) -> float:
 
 
 def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> float:
-    """With n pads, friction alone holds a weight alone where n mu F >= m g; `safety` times that."""
+    """What the plan says; else `safety` times what holds a weight by friction alone: n mu F >= m g."""
     if len(span.pads) < 2 or options.weld:
         return 0.0
     if options.squeeze is not None:
         return options.squeeze
+    if span.squeeze is not None:
+        return span.squeeze
     grip = grip_of(span, friction, options)
     if grip <= 0.0:
         return 0.0
