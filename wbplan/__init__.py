@@ -1,5 +1,6 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
+from wbplan import gaits
 from wbplan.active import Active
 from wbplan.bodies import Body, Carried, Grip
 from wbplan.bundle import Bundle, Trajectory
@@ -8,6 +9,7 @@ from wbplan.contacts import Contact, Push
 from wbplan.errors import (
     BundleError,
     CheckFailed,
+    GaitError,
     ModelError,
     Relaxation,
     SolveError,
@@ -16,6 +18,7 @@ from wbplan.errors import (
     WbplanError,
 )
 from wbplan.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
@@ -38,6 +41,7 @@ from wbplan.version import VERSION as __version__
 __all__ = [
     "AS_IS",
     "Active",
+    "BalanceTask",
     "Body",
     "Box",
     "Bundle",
@@ -51,6 +55,7 @@ __all__ = [
     "Cylinder",
     "DampingTask",
     "Forces",
+    "GaitError",
     "Grip",
     "Ground",
     "HeightField",
@@ -59,6 +64,7 @@ __all__ = [
     "Line",
     "Live",
     "Loop",
+    "ManipulabilityTask",
     "Mesh",
     "MinJerk",
     "ModelError",
@@ -92,6 +98,7 @@ __all__ = [
     "WbplanError",
     "__version__",
     "check",
+    "gaits",
     "load_robot",
     "plan",
 ]

@@ -36,6 +36,7 @@ class Recorder:
         self._margin: list[float] = []
         self._phase: list[int] = []
         self._errors: list[dict[str, float]] = []
+        self._measures: list[dict[str, float]] = []
         self._worst: dict[str, float] = {}
         self._targets: list[dict[str, Array]] = []
         self._bodies: list[dict[str, Array]] = []
@@ -56,6 +57,7 @@ class Recorder:
             self._margin,
             self._phase,
             self._errors,
+            self._measures,
             self._targets,
             self._bodies,
         ):
@@ -80,6 +82,7 @@ class Recorder:
         self._phase.append(index)
         errors = stack.errors()
         self._errors.append(errors)
+        self._measures.append(stack.keep_measures()())
         for name, error in errors.items():
             self._worst[name] = max(error, self._worst.get(name, 0.0))
         self._targets.append(loop.targets())
@@ -120,6 +123,7 @@ class Recorder:
                         "pose": [float(x) for x in pin.SE3ToXYZQUAT(h.T_holder_body)],
                         "mass": h.body.mass,
                         "com": list(h.body.com),
+                        **({"pads": list(h.pads)} if h.pads else {}),
                     }
                     for h in loop.compiled.held
                 ],
@@ -159,6 +163,7 @@ class Recorder:
             moments=found.moments,
             torque=found.torque,
             push=found.push,
+            measures={name: column[:, 0] for name, column in _columns(self._measures, 1).items()},
         )
         microseconds = np.array(self._microseconds)
         report = {

@@ -23,11 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan import kernels
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
+from wbplan.ascent import Ascent
+from wbplan.compiled import CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
 from wbplan.paths import number
 from wbplan.posture import Posture
-from wbplan.rows import Rows
+from wbplan.rows import Rows, reach
 
 Array = NDArray[np.float64]
 
@@ -39,17 +40,6 @@ MARGIN_RESERVE = 1e-4
 
 #: Stands for no bound in the QP.
 UNBOUNDED = 1e20
-
-
-def reach(model: Any, frame: int) -> float:
-    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
-    if frame == WORLD:
-        return 0.0
-    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [
-        model.frames[frame].placement.translation
-    ]
-    return float(sum(np.linalg.norm(link) for link in links))
 
 
 @final
@@ -86,6 +76,7 @@ class Stack:
         blocks: what the rows of C are.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
+        ascents: manipulability tasks.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
 
@@ -103,6 +94,7 @@ class Stack:
         self._soft_rows()
         self._joint_box()
         self._polygon()
+        self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
 
     def _hard_rows(self) -> None:
         rows, nf = self.rows, len(self.free)
@@ -254,6 +246,9 @@ class Stack:
             self._stiffness, self._posture_pull, self._posture_goal, self._posture_step, kin.q[self.q_index],
             self.H, self.g,
         )  # fmt: skip
+        for ascent in self.ascents:
+            ascent.update()
+            ascent.write(self.H, self.g)
         self.fill_box()
         support = self.phase.phase.support
         if support is not None:
@@ -363,6 +358,14 @@ class Stack:
             self._name_errors, self.rows.error.copy(), self.hard_error[self.rows.hard :].copy(),
             self._posture_goal - joints,
         )  # fmt: skip
+
+    def keep_measures(self) -> Callable[[], dict[str, float]]:
+        """What is reported of this moment beside errors, to be worked out whenever somebody asks.
+
+        Keys: '<task>.manipulability', w of a manipulability task.
+        """
+        q, ascents = self.kinematics.q.copy(), self.ascents
+        return lambda: {f"{ascent.label}.manipulability": ascent.value_at(q) for ascent in ascents}
 
     def _name_errors(self, error: Array, hard_joints: Array, postures: Array) -> dict[str, float]:
         found = {f"{label}.{part}": _norm(error[span]) for label, part, span in self.rows.labels}

@@ -116,6 +116,8 @@ def test_a_body_has_a_name_mass_size_and_place(fields: dict[str, Any], says: str
         ({"by": ""}, r"Carried 'box'\.by: expected a name"),
         ({"by": None}, r"Carried 'box'\.by: expected a name"),
         ({"pose": np.zeros(3)}, r"Carried 'box'\.pose: expected pin\.SE3"),
+        ({"pads": "tip"}, r"Carried 'box'\.pads: expected a list of frames, got 'tip'"),
+        ({"pads": [""]}, r"Carried 'box'\.pads: expected a name"),
         ({"pose": None}, r"Carried 'box'\.pose: expected pin\.SE3"),
         (
             {"pose": pin.SE3(np.eye(3), np.array([0.0, np.nan, 0.0]))},
@@ -203,7 +205,7 @@ def test_a_duration_is_finite_and_positive(duration: Any) -> None:
         ({"soft": [[wb.ComTask()], [wb.ComTask()]]}, "named more than once: com"),
         (
             {"soft": [[wb.DampingTask()], [wb.ComTask()]]},
-            r"phase 'p'\.soft\[0\]: a damping task would forbid the levels below all motion",
+            r"phase 'p'\.soft\[0\]: damping would forbid the levels below all motion",
         ),
         ({"hard": [wb.DampingTask()]}, r"phase 'p'\.hard: a damping task forbids all motion; put it in soft"),
     ],

@@ -21,7 +21,9 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, CompiledPhase, ComTarget, FrameTarget
+from wbplan.aims import ComTarget
+from wbplan.backends.placo_ascent import PlacoAscent
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.qp import Solution
@@ -70,6 +72,7 @@ class PlacoBackend:
         self._joints_given()
         self._com_tasks()
         self._posture_tasks()
+        self._ascents = [PlacoAscent(ascent, stack, solver) for ascent in stack.ascents]
         self._limits()
 
     def _priority(self, label: str, hard: bool, weight: float) -> tuple[str, float]:
@@ -259,6 +262,10 @@ class PlacoBackend:
             goals = posture.next_goal(joints)[columns].tolist()
             for name, goal in zip(names, goals, strict=True):
                 task.set_joint(name, goal)
+        if self._ascents:
+            stack.kinematics.differentiate()
+        for ascent in self._ascents:
+            ascent.aim()
         for k, j, name, task in self._driven:
             task.set_joint(name, float(stack.kinematics.q[j] + stack.driven_step[k]))
         for (task, name), goal in zip(self._hard_joints, stack.hard_joint_goal, strict=True):

@@ -40,6 +40,7 @@ class Trajectory:
         torque: (N, nv-6) [N m, N] of the joints, with these forces and the motion's accelerations.
         push: (N,) [N], the largest force on the CoM in the worst horizontal direction that the contacts bear;
             nan where there are too few.
+        measures: "<task>.manipulability" [-] -> (N,); nan where absent.
     """
 
     time: Array
@@ -56,6 +57,7 @@ class Trajectory:
     moments: Mapping[str, Array] = field(default_factory=dict)
     torque: Array | None = None
     push: Array | None = None
+    measures: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -229,4 +231,5 @@ def _trajectory(arrays: Mapping[str, NDArray[Any]], where: str) -> Trajectory:
         forces=groups["forces"],
         moments=groups["moments"],
         **{k: rules.as_numbers(arrays[k], f"{where}: {k}") for k in rules.OPTIONAL if k in arrays},
+        measures=groups["measures"],
     )

@@ -26,7 +26,14 @@ NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 NUMBERS = ("time", "q", "v", "com", "margin")
 OPTIONAL = ("torque", "push")
 #: prefix in the file -> field
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "force": "forces", "moment": "moments"}
+GROUPS = {
+    "body": "bodies",
+    "target": "targets",
+    "error": "errors",
+    "measure": "measures",
+    "force": "forces",
+    "moment": "moments",
+}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 EDGE = 1e-9  #: [s], two times nearer than this are one
@@ -100,6 +107,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"moment_{name}": (samples, 3) for name in motion.moments},
         **({} if motion.torque is None else {"torque": (samples, model.nv - 6)}),
         **({} if motion.push is None else {"push": (samples,)}),
+        **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
         array = _array(motion, key)
@@ -107,7 +115,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
             raise BundleError(f"{where}: {key}: expected shape {shape}, found {array.shape}")
         if key == "phase" and array.dtype.kind not in "iu":
             raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
-        # A margin, object, target or error may be absent at a sample; all else is there or broken.
+        # A margin, object, target, error or measure may be absent at a sample; all else is there or broken.
         if values and key in ("time", "q", "v", "com") and not np.isfinite(array).all():
             at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
@@ -257,6 +265,8 @@ def _check_phase(phase: _Field, model: Any) -> None:
         for key in ("friction", "patch", "squeeze"):
             if key in item:
                 item[key].number(0.0)
+        for pad in item["pads"].items() if "pads" in item else ():
+            pad.frame(model)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:

@@ -263,7 +263,7 @@ def _add_welds(spec: Any, bundle: Bundle, motion: Motion, options: Options) -> l
             names.append(span.name)
             spec.add_equality(
                 name=f"{span.name}_weld", type=mj.mjtEq.mjEQ_WELD, objtype=mj.mjtObj.mjOBJ_BODY,
-                name1=span.pads[0], name2=span.name, active=False,
+                name1=span.holder, name2=span.name, active=False,
             )  # fmt: skip
     return names
 
