@@ -34,6 +34,8 @@ LAYERS = [
     "gaits",
     "rows",
     "posture",
+    "levels",
+    "blocks",
     "ascent",
     "stack",
     "diagnose",

@@ -163,7 +163,11 @@ class Bundle:
             BundleError: naming the file and the field at fault.
         """
         folder = Path(folder)
-        if not folder.is_dir():
+        try:
+            is_folder = folder.is_dir()
+        except OSError as error:
+            raise BundleError(f"{folder}: cannot be read: {error.strerror or error}") from error
+        if not is_folder:
             found = "a file" if folder.is_file() else "nothing"
             raise BundleError(f"{folder}: expected a folder with a plan bundle, found {found}")
         plan = files.read_plan(folder / files.PLAN)
