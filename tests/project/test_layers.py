@@ -52,6 +52,7 @@ LAYERS = [
     "physics",
     "recorder",
     "planner",
+    "survey",
     "taskfile",
     "papers",
     "bench",

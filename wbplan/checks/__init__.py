@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wbplan.bundle import Bundle
-from wbplan.checks import balance, clearance, contacts, joints, objects
+from wbplan.checks import balance, clearance, contacts, forces, joints, objects
 from wbplan.checks.replay import Replay
 from wbplan.checks.report import CheckReport, Row, Tolerances
 
@@ -53,7 +53,7 @@ def check(
         rows = joints.sampling_rows(bundle)
         if all(row.held for row in rows):  # else nothing more can be computed
             replay = Replay.of(bundle)
-            for rules in (joints.rows, contacts.rows, balance.rows, objects.rows):
+            for rules in (joints.rows, contacts.rows, balance.rows, forces.rows, objects.rows):
                 rows.extend(rules(replay, bounds))
             rows.extend(clearance.rows(bundle, replay, tuple(Path(folder) for folder in folders)))
     return CheckReport(tuple(rows))
