@@ -55,6 +55,7 @@ LAYERS = [
     "reasons",
     "recorder",
     "planner",
+    "survey",
     "taskfile",
     "papers",
     "bench",
