@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from wbplan import kernels
 from wbplan.ascent import Ascent
-from wbplan.blocks import RowBlock
+from wbplan.blocks import RowBlock, edge_names, name_rows
 from wbplan.collision import CAPACITY, Clearance, collision_model
 from wbplan.compiled import CompiledPhase
 from wbplan.kinematics import Kinematics
@@ -307,14 +307,29 @@ class Stack:
             self.clearance.linearise(kin.jacobian, *self._near)
         self.driven_step[:] = given
 
-    @property
-    def reaches(self) -> Array:
-        """(nf - 6,) how far [m or rad] the speed limit lets each free joint move in one tick."""
-        return self._reach
-
     def reach(self, column: int) -> float:
         """How far [m or rad] the speed limit lets a free column move in one tick."""
         return float(self._reach[column - 6])
+
+    def box_kind(self, column: int, *, up: bool) -> str:
+        """What makes a free column's bound: 'position' or 'speed'."""
+        bound = self.upper[column] if up else -self.lower[column]
+        return "speed" if bound >= self._reach[column - 6] * (1.0 - 1e-9) else "position"
+
+    def relaxed_box(self, column: int, kind: str, by: float, *, up: bool) -> tuple[Array, Array]:
+        """Lower and upper as they would be were a limit of one joint wider by so much [rad, m, or per s]."""
+        kept, j = (self._q_lower.copy(), self._q_upper.copy(), self._reach.copy()), column - 6
+        if kind == "speed":
+            self._reach[j] += by * self.dt
+        elif up:
+            self._q_upper[j] += by
+        else:
+            self._q_lower[j] -= by
+        self.fill_box()
+        moved = self.lower.copy(), self.upper.copy()
+        self._q_lower, self._q_upper, self._reach = kept
+        self.fill_box()
+        return moved
 
     # -- names -------------------------------------------------------------------------------------------
 
@@ -324,11 +339,8 @@ class Stack:
         for label, part, span in self.rows.labels:
             if span.stop <= self.rows.hard:
                 names += [(label, "m" if part == "position" else "rad")] * (span.stop - span.start)
-        sliding = {
-            j
-            for j, joint in enumerate(list(self.phase.model.joints)[2:])
-            if "JointModelP" in joint.shortname()
-        }
+        joints = enumerate(list(self.phase.model.joints)[2:])
+        sliding = {j for j, joint in joints if "JointModelP" in joint.shortname()}
         return names + [(label, "m" if j in sliding else "rad") for j, _, label in self.hard_joints]
 
     def row_names(self) -> list[tuple[str, str, str]]:
@@ -337,30 +349,16 @@ class Stack:
 
     def keep_row_names(self) -> Callable[[], list[tuple[str, str, str]]]:
         """`row_names` of this moment, to be worked out whenever somebody asks."""
-        return partial(self._name_rows, [block.keep() for block in self.blocks])
-
-    def _name_rows(self, names: list[Callable[[], list[str]]]) -> list[tuple[str, str, str]]:
-        return [
-            (name, block.kind, block.unit)
-            for block, called in zip(self.blocks, names, strict=True)
-            for name in called()
-        ]
+        return partial(name_rows, self.blocks, [block.keep() for block in self.blocks])
 
     def edge_names(self) -> list[str]:
         """Name of every support-polygon row: the two feet that its edge joins, or a side of the region."""
-        if self.phase.polygon is None:
-            return []
-        if self.phase.region:
-            angles = np.degrees(np.arctan2(*self.phase.polygon.normals.T[::-1]))
-            return [f"support region, side towards {angle:.0f} deg" for angle in angles]
-        feet = [c.frame for c in self.phase.phase.contacts]
-        return [f"support polygon edge {feet[i]}-{feet[j]}" for i, j in self.phase.polygon.edges]
+        return edge_names(self.phase)
 
     def box_names(self) -> list[tuple[str, str]]:
         """(lower, upper) bound's name of every free column."""
-        names: list[tuple[str, str]] = [("base", "base")] * 6
-        joints = self.phase.robot.joint_names
-        return names + [(f"{joints[c - 6]} lower", f"{joints[c - 6]} upper") for c in self.free[6:]]
+        joints = [self.phase.robot.joint_names[c - 6] for c in self.free[6:]]
+        return [("base", "base")] * 6 + [(f"{joint} lower", f"{joint} upper") for joint in joints]
 
     def errors(self) -> dict[str, float]:
         """Norm of every task's error at the last `measure`.

@@ -225,6 +225,10 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         _check_pair(pair)
     for foot in root["feet"].items() if "feet" in root else ():
         foot.frame(model)
+    for note in root["why"].items() if "why" in root else ():
+        if not isinstance(note.value, Mapping):
+            raise note.fail("an object")
+        note["time"].number(), note["until"].number(), note["text"].text()
     standing = {item.name for item in obstacles_of(plan, where)}
     for phase in root["phases"].items(least=1):
         _check_phase(phase, model)
