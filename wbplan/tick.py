@@ -25,6 +25,7 @@ from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.paths import number
+from wbplan.qp import Solution
 from wbplan.retract import DRIFT, Retraction
 from wbplan.robot import Robot
 from wbplan.script import Phase
@@ -138,6 +139,22 @@ class Loop:
         self._retraction = Retraction(self.stack)
 
     @property
+    def backend(self) -> str:
+        """Name of the backend that solves."""
+        return self._backend.name
+
+    def restart(self, backend: str | None = None) -> None:
+        """Go on from here with a new solver, which remembers nothing of the ticks before.
+
+        Args:
+            backend: 'proxqp' or 'placo'; by default the same as before.
+
+        Raises:
+            SpecError: there is no such backend, or it cannot express the phase.
+        """
+        self._backend = make_backend(backend or self.backend, self.stack)
+
+    @property
     def margin(self) -> float:
         """Stability margin now [m]."""
         return self.stack.margin
@@ -184,7 +201,7 @@ class Loop:
         ends = self.t + self.dt
         try:
             stack.advance(self.t)
-            solution = self._backend.solve()
+            solution = self._solve()
             new = self._keep(q, solution.step, before)
         except WbplanError:
             stack.aim(self.t)
@@ -193,6 +210,15 @@ class Loop:
         self.q, self.t = new, ends
         v = pin.difference(self.compiled.model, q, new) / self.dt
         return Tick(self, v, HeldBack(stack, solution), started)
+
+    def _solve(self) -> Solution:
+        """What the backend finds; whatever its library throws is a `SolveError`."""
+        try:
+            return self._backend.solve()
+        except (RuntimeError, ArithmeticError, ValueError) as error:
+            said = " ".join(str(error).split())[:200]
+            name = self.compiled.phase.name
+            raise SolveError(f"phase '{name}': the solver of '{self.backend}' failed: {said}") from error
 
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""

@@ -42,6 +42,7 @@ LAYERS = [
     "retract",
     "backends",
     "tick",
+    "fallback",
     "bundle",
     "checks",
     "plots",
