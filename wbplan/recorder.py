@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
 from wbplan.compiled import CompiledPhase
 from wbplan.obstacles import to_record
+from wbplan.reasons import Notes
 from wbplan.robot import Robot
 from wbplan.script import Script
+from wbplan.statics import Stance, plan_forces, promised
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION
 
@@ -43,7 +45,9 @@ class Recorder:
         self._warnings: list[str] = []
         self._phases: list[dict[str, Any]] = []
         self._placed: Mapping[str, Any] = {}
+        self._stances: list[Stance] = []
         self._start = 0.0
+        self._notes = Notes(script.duration)
         self._samples: tuple[list[Any], ...] = (
             self._q,
             self._com,
@@ -82,6 +86,7 @@ class Recorder:
         if tick.warning:
             self._warnings.append(f"{loop.compiled.phase.name}: {tick.warning}")
         self._sample(self._index, loop)
+        self._notes.take(loop, tick, len(self._v) * self._dt)
 
     def _sample(self, index: int, loop: Loop) -> None:
         stack = loop.stack
@@ -100,6 +105,8 @@ class Recorder:
     def end(self, index: int, loop: Loop, elapsed: float) -> None:
         """A phase is over: its entry in plan.json."""
         phase = loop.compiled.phase
+        compiled = loop.compiled
+        self._stances.append(Stance(phase, compiled.model, compiled.contact_points, compiled.held))
         first = self._phase.index(index)
         errors = self._errors[first:]
         tasks = []
@@ -152,17 +159,31 @@ class Recorder:
         """Everything recorded, as a bundle."""
         n = len(self._q)
         margin = np.array(self._margin)
+        index = np.array(self._phase, dtype=np.int64)
+        found = plan_forces(self._stances, np.array(self._q), index, self._dt)
+        for entry, stance, forces in zip(self._phases, self._stances, found.phases, strict=True):
+            promises, warning = promised(stance, forces)
+            entry.update(promises)
+            for clamp in forces.clamps:
+                next(item for item in entry["carried"] if item["name"] == clamp.name).update(
+                    clamp.to_record()
+                )
+            self._warnings += [warning] if warning else []
         trajectory = Trajectory(
             time=np.arange(n, dtype=np.float64) * self._dt,
             q=np.array(self._q),
             v=np.array([*self._v, np.zeros(self._robot.model.nv)]),
-            phase=np.array(self._phase, dtype=np.int64),
+            phase=index,
             com=np.array(self._com),
             margin=np.where(np.isfinite(margin), margin, np.nan),
             joint_names=tuple(self._robot.joint_names),
             bodies=_columns(self._bodies, 7),
             targets=_columns(self._targets, 7),
             errors={name: column[:, 0] for name, column in _columns(self._errors, 1).items()},
+            forces=found.forces,
+            moments=found.moments,
+            torque=found.torque,
+            push=found.push,
             measures={name: column[:, 0] for name, column in _columns(self._measures, 1).items()},
         )
         microseconds = np.array(self._microseconds)
@@ -186,6 +207,7 @@ class Recorder:
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
             "obstacles": [to_record(item) for item in self._script.obstacles],
             "phases": self._phases,
+            "why": self._notes.found,
             "report": report,
         }
         return Bundle(plan, trajectory, self._robot.urdf_text)

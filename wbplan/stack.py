@@ -15,7 +15,6 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -24,8 +23,10 @@ from numpy.typing import NDArray
 
 from wbplan import kernels
 from wbplan.ascent import Ascent
+from wbplan.blocks import RowBlock
 from wbplan.compiled import CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.levels import Level
 from wbplan.paths import number
 from wbplan.posture import Posture
 from wbplan.rows import Rows, reach
@@ -43,24 +44,6 @@ UNBOUNDED = 1e20
 
 
 @final
-@dataclass(frozen=True)
-class RowBlock:
-    """Inequality rows of one kind: consecutive rows of C.
-
-    Attributes:
-        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
-        span: where its rows stand.
-        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
-            gives one name a row, '' for a row that is not in use.
-    """
-
-    kind: str
-    unit: str
-    span: slice
-    keep: Callable[[], Callable[[], list[str]]]
-
-
-@final
 class Stack:
     """Matrices of a compiled phase, filled in place.
 
@@ -72,8 +55,9 @@ class Stack:
             `rows` that are hard, then hard joints.
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
-        damping: what stands on the whole diagonal of H, at the last `assemble`.
         blocks: what the rows of C are.
+        levels: the soft tasks by priority; H and g are those of the first.
+        normals: (E, 2) of the support polygon's edges.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
         ascents: manipulability tasks.
@@ -89,7 +73,7 @@ class Stack:
         self.driven_step = np.zeros(len(self.driven))
         self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
         self.driving = bool(self._moving_driven)
-        self.drift, self.margin, self.damping = 0.0, np.inf, 0.0
+        self.drift, self.margin = 0.0, np.inf
         self._hard_rows()
         self._soft_rows()
         self._joint_box()
@@ -124,10 +108,10 @@ class Stack:
             rows.motion[soft],
         )
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
-        self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
+        self._curvature = 0.5 * self.levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
         self._soft_part = self._part(soft, self._soft, self._soft_given)
-        targets = [t for t in self.phase.joint_targets if not t.hard]
+        targets = sorted((t for t in self.phase.joint_targets if not t.hard), key=lambda t: t.level)
         self._posture_goal, self._posture_step = np.zeros((2, len(targets), nf - 6))
         self.postures = [
             Posture(t, self.free, self.dt, self._posture_goal[k], self._posture_step[k])
@@ -137,9 +121,23 @@ class Stack:
         for k, posture in enumerate(self.postures):
             self._stiffness[k] = posture.stiffness
         self._posture_pull = np.array([p.pull for p in self.postures])
-        self._diagonal = np.full(nf, REGULARISATION + self.phase.damping)
-        self._diagonal[6:] += self._stiffness.sum(axis=0)
-        self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
+        count = len(self.phase.phase.levels)
+        self.levels = [self._level(k, count, [t.level for t in targets]) for k in range(count)]
+        self.H, self.g = self.levels[0].H, self.levels[0].g
+
+    def _level(self, k: int, count: int, postures: list[int]) -> Level:
+        """The k-th level of soft tasks: where its rows and posture tasks stand."""
+        nf = len(self.free)
+        rows = slice(*np.searchsorted(self.rows.levels, (k, k + 1)))
+        tasks = slice(*np.searchsorted(postures, (k, k + 1)))
+        diagonal = np.full(nf, REGULARISATION + (self.phase.damping if k == count - 1 else 0.0))
+        diagonal[6:] += self._stiffness[tasks].sum(axis=0)
+        return Level(
+            self._soft[rows], self._weight[rows], self._soft_rhs[rows], self._soft_error[rows],
+            self._curvature[rows], self._pull[rows], diagonal, self._stiffness[tasks],
+            self._posture_pull[tasks], self._posture_goal[tasks], self._posture_step[tasks],
+            np.zeros((nf, nf)), np.zeros(nf),
+        )  # fmt: skip
 
     def _part(self, span: slice, out: Array, given: Array) -> tuple[Any, ...]:
         """Arguments of `kernels.rows` for a span of rows: all views, taken once."""
@@ -149,14 +147,14 @@ class Stack:
             rows.frame_groups, self.free, self.driven, self.driven_step, out, given,
         )  # fmt: skip
 
-    def _levers(self, soft: slice) -> Array:
-        """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
+    def levers(self, rows: slice) -> Array:
+        """Bound on each row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
         # A base on its feet moves by the legs that it stands on: their length is its lever arm.
         held = (t for t in self.phase.frame_targets if t.hard)
         standing = max((reach(model, t.frame) for t in held), default=0.0)
-        for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
+        for target, row in zip(self.rows.targets_of_rows[rows], self.rows.chosen[rows], strict=True):
             group = row // 3
             if not isinstance(target, FrameTarget):
                 levers.append(longest)
@@ -182,7 +180,7 @@ class Stack:
 
     def _polygon(self) -> None:
         polygon = self.phase.polygon
-        self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
+        self.normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
         self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
         edges = len(self._offsets)
         self.C, self.d = np.zeros((edges, len(self.free))), np.zeros(edges)
@@ -223,7 +221,7 @@ class Stack:
         """Kinematics, errors and margin at `q` for the targets as they stand now."""
         rows = self.rows
         self.kinematics.update(q)
-        self.drift, self.margin = rows.measure(self.kinematics, self._normals, self._offsets)
+        self.drift, self.margin = rows.measure(self.kinematics, self.normals, self._offsets)
         self.hard_error[: rows.hard] = rows.error[: rows.hard]
         for i, (joint, _, _) in enumerate(self.hard_joints):
             error = self.hard_joint_goal[i] - q[7 + joint]
@@ -241,14 +239,12 @@ class Stack:
         self.b[: rows.hard] += rows.motion[: rows.hard] - self._hard_given
         np.multiply(self._pull, self._soft_error, out=self._soft_rhs)
         self._soft_rhs += self._soft_motion - self._soft_given
-        self.damping = self.phase.damping + REGULARISATION + kernels.cost(
-            self._soft, self._weight, self._soft_rhs, self._soft_error, self._curvature, self._diagonal,
-            self._stiffness, self._posture_pull, self._posture_goal, self._posture_step, kin.q[self.q_index],
-            self.H, self.g,
-        )  # fmt: skip
+        joints = kin.q[self.q_index]
+        for level in self.levels:
+            level.assemble(joints)
         for ascent in self.ascents:
             ascent.update()
-            ascent.write(self.H, self.g)
+            ascent.write(self.levels[-1].H, self.levels[-1].g)
         self.fill_box()
         support = self.phase.phase.support
         if support is not None:
@@ -257,13 +253,13 @@ class Stack:
     def _fill_polygon(self, margin: float, least: float) -> None:
         kin = self.kinematics
         kernels.polygon(
-            self._normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
+            self.normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
             margin + MARGIN_RESERVE, least, self.C, self.d,
         )  # fmt: skip
 
     def distances(self) -> Array:
         """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
-        gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
+        gaps: Array = self._offsets - self.normals @ self.kinematics.com[:2]
         return gaps
 
     def fill_box(self) -> None:
@@ -297,6 +293,26 @@ class Stack:
     def reach(self, column: int) -> float:
         """How far [m or rad] the speed limit lets a free column move in one tick."""
         return float(self._reach[column - 6])
+
+    def box_kind(self, column: int, *, up: bool) -> str:
+        """What makes a free column's bound: 'position' or 'speed'."""
+        bound = self.upper[column] if up else -self.lower[column]
+        return "speed" if bound >= self._reach[column - 6] * (1.0 - 1e-9) else "position"
+
+    def relaxed_box(self, column: int, kind: str, by: float, *, up: bool) -> tuple[Array, Array]:
+        """Lower and upper as they would be were a limit of one joint wider by so much [rad, m, or per s]."""
+        kept, j = (self._q_lower.copy(), self._q_upper.copy(), self._reach.copy()), column - 6
+        if kind == "speed":
+            self._reach[j] += by * self.dt
+        elif up:
+            self._q_upper[j] += by
+        else:
+            self._q_lower[j] -= by
+        self.fill_box()
+        moved = self.lower.copy(), self.upper.copy()
+        self._q_lower, self._q_upper, self._reach = kept
+        self.fill_box()
+        return moved
 
     # -- names -------------------------------------------------------------------------------------------
 

@@ -12,9 +12,10 @@ import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
+from wbplan.backends.cascade import Cascade
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
-from wbplan.qp import Multipliers, Solution
+from wbplan.qp import LevelSolution, Multipliers, Solution
 from wbplan.stack import UNBOUNDED, Stack
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ class ProxqpBackend:
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
         self._guess = ActiveSetGuess(stack)
+        self._cascade = Cascade(stack) if len(stack.levels) > 1 else None
         self._qp = self._new_solver()
         self._started, self._scale = False, 1.0
         self._unbounded = np.full(len(stack.d), -UNBOUNDED)
@@ -55,11 +57,15 @@ class ProxqpBackend:
         s = self._stack
         s.assemble()
         x, multipliers = self._guess.solve() or self._ask_solver()
+        levels: tuple[LevelSolution, ...] = ()
+        if self._cascade is not None:
+            levels = (LevelSolution(x, multipliers), *self._cascade.solve(x, multipliers))
+            x = levels[-1].x
         step = self._rest.copy()
         step[s.free] = np.minimum(np.maximum(x, s.lower), s.upper)
         if s.driving:
             step[s.driven] = s.driven_step
-        return Solution(step, multipliers)
+        return Solution(step, multipliers, levels)
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack

@@ -25,8 +25,16 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-#: Prefix in the file -> field.
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
+OPTIONAL = ("torque", "push")
+#: prefix in the file -> field
+GROUPS = {
+    "body": "bodies",
+    "target": "targets",
+    "error": "errors",
+    "measure": "measures",
+    "force": "forces",
+    "moment": "moments",
+}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 MOST = 1e12  #: no length, time, mass or speed of a plan comes near this; squares of larger numbers overflow
@@ -105,6 +113,10 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"force_{name}": (samples, 3) for name in motion.forces},
+        **{f"moment_{name}": (samples, 3) for name in motion.moments},
+        **({} if motion.torque is None else {"torque": (samples, model.nv - 6)}),
+        **({} if motion.push is None else {"push": (samples,)}),
         **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
@@ -219,6 +231,10 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["dt"].fail("a number above 0")
     if not isinstance(root["report"].value, Mapping):
         raise root["report"].fail("an object")
+    for note in root["why"].items() if "why" in root else ():
+        if not isinstance(note.value, Mapping):
+            raise note.fail("an object")
+        note["time"].number(), note["until"].number(), note["text"].text()
     standing = {item.name for item in obstacles_of(plan, where)}
     for phase in root["phases"].items(least=1):
         _check_phase(phase, model)
@@ -269,6 +285,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for key in ("friction", "patch", "squeeze"):
+            if key in item:
+                item[key].number(0.0)
         for pad in item["pads"].items() if "pads" in item else ():
             pad.frame(model)
     for task in phase["tasks"].items():
@@ -278,6 +297,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
     for push in phase["pushes"].items() if "pushes" in phase else ():
         push["frame"].frame(model)
         push["force"].vector(3)
+    for key in ("friction_use", "torque_use"):
+        if key in phase:
+            phase[key].number(0.0)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 

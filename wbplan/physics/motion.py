@@ -34,6 +34,7 @@ class Span:
         pads: the frames that press on it; one where it is not clamped.
         friction: of the pads, where the plan says it.
         holder: the frame that the plan fastens it to.
+        squeeze: [N] of each pad, where the plan says it.
     """
 
     name: str
@@ -42,6 +43,25 @@ class Span:
     pads: tuple[str, ...]
     friction: float | None
     holder: str
+    squeeze: float | None = None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Pressing:
+    """A stretch of time in which a frame pushes on what is around, without a break.
+
+    Attributes:
+        frame: its name.
+        force: (3,) [N], world, of the robot.
+        start: [s].
+        end: [s].
+    """
+
+    frame: str
+    force: Array
+    start: float
+    end: float
 
 
 @final
@@ -63,6 +83,7 @@ class Motion:
         phase: (N,) and `phases`: their names.
         spans: when objects are carried.
         squeeze: force [N] of each pad, by object.
+        pushing: frames that ever push on what is around.
         objects: name -> (N, 7) planned poses.
         margin: (N,) [m], planned.
     """
@@ -81,6 +102,7 @@ class Motion:
     phases: tuple[str, ...]
     spans: tuple[Span, ...]
     squeeze: Mapping[str, float]
+    pushing: tuple[str, ...]
     objects: Mapping[str, Array]
     margin: Array
 
@@ -137,7 +159,8 @@ def motion_of(bundle: Bundle, options: Options) -> Motion:
         time=time, base=np.array(record.q[:, :7]), joints=joints, offsets=offsets,
         names=tuple(record.joint_names), feet=feet, places=places, touching=touching, friction=friction,
         normals=normals, phase=np.asarray(record.phase), phases=tuple(p["name"] for p in bundle.phases),
-        spans=spans, squeeze=squeeze, objects=held, margin=np.asarray(record.margin),
+        spans=spans, squeeze=squeeze, pushing=tuple(dict.fromkeys(p.frame for p in _pressings(bundle))),
+        objects=held, margin=np.asarray(record.margin),
     )  # fmt: skip
 
 
@@ -171,8 +194,25 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
                 spans[spans.index(last)] = replace(last, end=end)
             else:
-                spans.append(Span(item["name"], start, end, pads, item.get("friction"), item["frame"]))
+                friction, squeeze = item.get("friction"), item.get("squeeze")
+                spans.append(Span(item["name"], start, end, pads, friction, item["frame"], squeeze))
     return tuple(spans)
+
+
+def _pressings(bundle: Bundle) -> tuple[Pressing, ...]:
+    """Phases that push alike, one after the other, push without a break."""
+    found: list[Pressing] = []
+    origin = float(bundle.trajectory.time[0])
+    for phase in bundle.phases:
+        for item in phase.get("pushes", ()):
+            force = np.array(item["force"], dtype=np.float64)
+            start, end = float(phase["start"]) - origin, float(phase["end"]) - origin
+            last = next((p for p in reversed(found) if p.frame == item["frame"]), None)
+            if last is not None and abs(last.end - start) < 1e-6 and np.array_equal(last.force, force):
+                found[found.index(last)] = replace(last, end=end)
+            else:
+                found.append(Pressing(item["frame"], force, start, end))
+    return tuple(found)
 
 
 def grip_of(span: Span, friction: Array, options: Options) -> float:
@@ -183,11 +223,13 @@ def grip_of(span: Span, friction: Array, options: Options) -> float:
 
 
 def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> float:
-    """With n pads, friction alone holds a weight alone where n mu F >= m g; `safety` times that."""
+    """What the plan says; else `safety` times what holds a weight by friction alone: n mu F >= m g."""
     if len(span.pads) < 2 or options.weld:
         return 0.0
     if options.squeeze is not None:
         return options.squeeze
+    if span.squeeze is not None:
+        return span.squeeze
     grip = grip_of(span, friction, options)
     if grip <= 0.0:
         return 0.0
@@ -216,6 +258,10 @@ def _offsets(
     for row, k in enumerate(chosen):
         phase = bundle.phases[int(record.phase[k])]
         loads = [load for span in spans for load in _pad_loads(bundle, span, squeeze[span.name], k, options)]
+        loads += [
+            (model.getFrameId(p.frame), -_risen(float(time[k]), p, options.ramp) * p.force)
+            for p in _pressings(bundle)
+        ]
         feet = [model.getFrameId(c["frame"]) for c in phase["contacts"]]
         friction = options.reserve * np.array([c["friction"] for c in phase["contacts"]])
         if options.lead:
@@ -226,6 +272,14 @@ def _offsets(
     full = np.column_stack([np.interp(time, time[chosen], column) for column in torques.T])
     offsets: Array = faded(full, time) / _gains(model, options)
     return offsets
+
+
+def _risen(t: float, pressing: Pressing, ramp: float) -> float:
+    """Share of a push: it rises from its start on, and is gone at its end."""
+    ramp = min(ramp, 0.5 * (pressing.end - pressing.start))
+    knots = [pressing.start, pressing.start + ramp, pressing.end - ramp, pressing.end]
+    share = float(np.interp(t, knots, [0.0, 1.0, 1.0, 0.0]))
+    return share * share * (3.0 - 2.0 * share)
 
 
 def _pad_loads(bundle: Bundle, span: Span, force: float, k: int, options: Options) -> list[tuple[int, Array]]:
