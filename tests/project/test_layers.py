@@ -48,6 +48,7 @@ LAYERS = [
     "retract",
     "backends",
     "tick",
+    "fallback",
     "bundle",
     "checks",
     "plots",
