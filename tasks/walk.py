@@ -72,5 +72,12 @@ def script(
     else:
         bend = wb.gaits.straight if path == "straight" else wb.gaits.arc
         track = bend(length, turn=math.radians(turn), heading=course)
-    manner = wb.gaits.Manner(step_time=step_time, height=rise, margin=margin, friction=friction)
+    ground = wb.Obstacle("ground", wb.Ground(), friction=friction)
+    manner = wb.gaits.Manner(
+        step_time=step_time,
+        height=rise,
+        margin=margin,
+        friction=friction,
+        limits=(wb.SelfCollision(), wb.Obstacles([ground])),
+    )
     return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner).script
