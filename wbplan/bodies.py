@@ -78,12 +78,15 @@ class Carried:
             that stands nowhere yet (no `Body.pose`, not carried before) is then put at the frame itself.
         pads: frames that press on it, as a gripper's fingers do, by whose friction a simulation holds it;
             where not given, the holder and whatever forms a closed loop with it.
+        squeeze: force [N] with which each pad presses in a simulation; by default what friction needs to
+            hold the weight, and some more.
     """
 
     body: Body
     by: str
     pose: Any = field(default=AS_IS, compare=False)
     pads: tuple[str, ...] = ()
+    squeeze: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):
@@ -94,6 +97,9 @@ class Carried:
             raise SpecError(f"Carried '{self.body.name}'.pads: expected a list of frames, got {given!r}")
         pads = tuple(name_of(pad, f"Carried '{self.body.name}'.pads") for pad in given)
         object.__setattr__(self, "pads", pads)
+        if self.squeeze is not None:
+            at = f"Carried '{self.body.name}'.squeeze"
+            object.__setattr__(self, "squeeze", number(self.squeeze, at, "newtons of 0 or more", least=0.0))
         if not isinstance(self.pose, AsIs):
             object.__setattr__(self, "pose", _pose(self.pose, f"Carried '{self.body.name}'.pose"))
 
@@ -101,13 +107,14 @@ class Carried:
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A carried body: its pose in the holding frame, its frame's number in the phase's model, its pads."""
+    """A carried body: its pose in the holding frame, its frame's number in the phase's model, its grip."""
 
     body: Body
     holder: str
     T_holder_body: Any
     frame: int
     pads: tuple[str, ...] = ()
+    squeeze: float | None = None
 
 
 def frame_number(model: pin.Model, name: str, what: str) -> int:
@@ -173,6 +180,6 @@ def with_carried(
         inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()
         inertia.lever = np.array(body.com)
         frame = pin.Frame(body.name, holder.parentJoint, by, placement, pin.FrameType.BODY)
-        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads))
+        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads, item.squeeze))
         model.appendBodyToJoint(holder.parentJoint, inertia, placement)
     return model, tuple(held)

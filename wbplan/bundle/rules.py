@@ -250,6 +250,8 @@ def _check_phase(phase: _Field, model: Any) -> None:
             item["com"].vector(3)
         for pad in item["pads"].items() if "pads" in item else ():
             pad.frame(model)
+        if "squeeze" in item:
+            item["squeeze"].number(0.0)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:

@@ -34,6 +34,8 @@ class Span:
         pads: the frames that press on it; one where it is not clamped.
         friction: of the pads, where the plan says it.
         holder: the frame that the plan fastens it to.
+        squeeze: force of each pad [N], where the plan says it.
+        fingers: the plan names the pads.
     """
 
     name: str
@@ -42,6 +44,8 @@ class Span:
     pads: tuple[str, ...]
     friction: float | None
     holder: str
+    squeeze: float | None = None
+    fingers: bool = False
 
 
 @final
@@ -171,7 +175,8 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
                 spans[spans.index(last)] = replace(last, end=end)
             else:
-                spans.append(Span(item["name"], start, end, pads, item.get("friction"), item["frame"]))
+                grip = (item.get("friction"), item["frame"], item.get("squeeze"), bool(item.get("pads")))
+                spans.append(Span(item["name"], start, end, pads, *grip))
     return tuple(spans)
 
 
@@ -188,6 +193,8 @@ def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> f
         return 0.0
     if options.squeeze is not None:
         return options.squeeze
+    if span.squeeze is not None:
+        return span.squeeze
     grip = grip_of(span, friction, options)
     if grip <= 0.0:
         return 0.0

@@ -132,6 +132,8 @@ def scene_of(
                 grip = grip_of(span, motion.friction, options)
                 spec.geom(name).friction = [grip, grip * options.patch, 0.0001]
                 spec.geom(name).condim = 4
+                if span.fingers:  # MuJoCo's usual contact gives way by half a millimetre to a light object
+                    spec.geom(name).solref = [2.0 * options.dt, 1.0]
     floor = add_ground(spec, motion, bundle.obstacles)
     _add_objects(spec, bundle, motion, floor, options)
     pins = _add_pins(spec, motion, options)
