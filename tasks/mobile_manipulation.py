@@ -25,7 +25,8 @@ ROBOT = "legarm_hexapod"
 ARM = "limb1"
 HAND = f"{ARM}_tip"
 PADS = (f"{ARM}_pad_a", f"{ARM}_pad_b")
-SIZE = (0.020, 0.012, 0.070)  # of the object [m]: along the gripper, across it, upright
+SIZE = (0.024, 0.008, 0.040)  # of the object [m]: along the gripper, across it, upright
+ABOVE = 0.025  # over its stand, from where the object is lowered [m]
 REACH = 0.030  # from the palm to the object's middle [m]
 GRAB = (150.0, -42.0, 35.0, 7.0, -20.0)  # joints 1 to 5 [degrees] that reach for it: arm and tool level
 CLEAR = (120.0, -15.0, 50.0)  # joints 1 to 3 of the limb as a leg in the air
@@ -49,7 +50,7 @@ def script(
     step_time: float = 1.0,
     margin: float = 0.06,
     mass: float = 0.1,
-    grip: float = 8.0,
+    grip: float = 10.0,
     friction: float = 0.7,
 ) -> wb.Script:
     """The experiment's steps (a) to (i).
@@ -107,8 +108,10 @@ def script(
     out, back = folding.out(made.steps[rises - 1].support[ARM]), folding.back()
     acts: dict[int, Any] = {rises + k: fields for k, fields in enumerate(out)}
     near = rises + len(out)  # first step as an arm
-    takes, puts = near + 2, near + 9
+    takes = near + 2
+    puts = takes + len(TOUR) + 2
     grasp, place = (body(k, 0.5) * _hand(robot, GRAB) for k in (takes, puts + 1))
+    up = pin.SE3(np.eye(3), np.array([0.0, 0.0, ABOVE]))
     before = pin.SE3(np.eye(3), np.array([-0.06, 0.0, 0.0]))
     thing = wb.Body("object", mass=mass, size=SIZE, pose=grasp * _held())
     shut = _finger(SIZE[1] / 2.0, REACH - SIZE[0] / 2.0)
@@ -119,13 +122,16 @@ def script(
     acts[near] = reach(near, wb.MinJerk(wb.AS_IS, grasp * before, step_time))
     acts[near + 1] = reach(near + 1, wb.MinJerk(wb.AS_IS, grasp, step_time))
     acts[takes] = reach(takes, wb.Hold(grasp), driven=fingers(shut, 0.5 * step_time))
-    for k, pose in enumerate(TOUR, start=takes + 1):
+    acts[takes + 1] = reach(takes + 1, wb.MinJerk(wb.AS_IS, up * grasp, step_time), **held)
+    for k, pose in enumerate(TOUR, start=takes + 2):
         goal = wb.MinJerk(wb.AS_IS, _hand(robot, pose), step_time)
         acts[k] = reach(k, wb.gaits.WithBody(made.course, made.steps[k].begin, goal, height), **held)
-    acts[puts] = reach(puts, wb.MinJerk(wb.AS_IS, place, step_time), **held)
-    acts[puts + 1] = reach(puts + 1, wb.Hold(place), driven=fingers(math.pi / 2.0, 0.7 * step_time))
-    acts[puts + 2] = reach(puts + 2, wb.MinJerk(wb.AS_IS, place * before, step_time))
-    acts |= {puts + 3 + k: fields for k, fields in enumerate(back)}
+    acts[puts] = reach(puts, wb.MinJerk(wb.AS_IS, up * place, step_time), **held)
+    acts[puts + 1] = reach(puts + 1, wb.MinJerk(wb.AS_IS, place, step_time), **held)
+    acts[puts + 2] = reach(puts + 2, wb.Hold(place), driven=fingers(math.pi / 2.0, 0.7 * step_time))
+    acts[puts + 3] = reach(puts + 3, wb.MinJerk(wb.AS_IS, place * before, step_time))
+    acts |= {puts + 4 + k: fields for k, fields in enumerate(back)}
+    acts |= {k: {"soft": (folding.posture(_joints(CLEAR)),)} for k in range(puts + 4 + len(back), lands - 1)}
     acts[lands - 1] = folding.lowered(made.steps[lands].swing[ARM][1], body(lands - 1, 1.0))
     manner = wb.gaits.Manner(
         step_time=step_time, height=0.01, margin=margin, friction=friction, speed=0.9, settle=0.5

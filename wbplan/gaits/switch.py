@@ -196,7 +196,7 @@ class Unfolding:
         return tuple(found)
 
     def lowered(self, foothold: Array, body: Any, above: float = 0.012) -> Fields:
-        """The step before the foot lands: its joints go to where it is a little above its foothold.
+        """The step before the foot lands: it goes to a little above its foothold.
 
         Args:
             foothold: (3,) [m], world.
@@ -206,12 +206,15 @@ class Unfolding:
         Raises:
             SpecError: the foot cannot be there.
         """
-        there = body.actInv(np.asarray(foothold) + np.array([0.0, 0.0, above]))
+        goal = np.asarray(foothold) + np.array([0.0, 0.0, above])
+        there = body.actInv(goal)
         self.walker.require(self.limb, there, f"{above:g} m above its foothold")
         leg = self.walker.closed[self.limb]
-        now = [self.clear.get(name, 0.0) for name in leg.joints]
-        joints = leg.solve(there).nearest(now).joints
-        return {"soft": (self.posture(dict(zip(leg.joints, joints, strict=True))),)}
+        joints = leg.solve(there).nearest([self.clear.get(name, 0.0) for name in leg.joints]).joints
+        over = PositionTask(
+            self.walker.robot.feet[self.limb], MinJerk(AS_IS, goal, self.step_time), weight=50.0
+        )
+        return {"soft": (over, self.posture(dict(zip(leg.joints, joints, strict=True)), 0.1))}
 
     def posture(self, values: Mapping[str, float], weight: float = 1.0) -> PostureTask:
         """The limb's joints to values, from rest to rest in a step."""
