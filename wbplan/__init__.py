@@ -18,6 +18,7 @@ from wbplan.errors import (
     WbplanError,
 )
 from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
@@ -40,6 +41,7 @@ from wbplan.version import VERSION as __version__
 __all__ = [
     "AS_IS",
     "Active",
+    "BalanceTask",
     "Body",
     "Box",
     "Bundle",
@@ -60,6 +62,7 @@ __all__ = [
     "Line",
     "Live",
     "Loop",
+    "ManipulabilityTask",
     "Mesh",
     "MinJerk",
     "ModelError",

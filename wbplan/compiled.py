@@ -12,9 +12,11 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
+from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
@@ -47,19 +49,6 @@ class FrameTarget:
     path: Path
     position_weight: Array
     rotation_weight: Array
-    gain: float
-    hard: bool
-    level: int = 0
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class ComTarget:
-    """A CoM task with its target bound."""
-
-    label: str
-    path: Path
-    weight: Array
     gain: float
     hard: bool
     level: int = 0
@@ -107,6 +96,7 @@ class CompiledPhase:
             such limit.
         region: whether `polygon` is the static-equilibrium region: the hull is not, unless the contacts lie
             in one plane and nothing pushes.
+        ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
     """
 
@@ -125,6 +115,7 @@ class CompiledPhase:
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
+    ascents: tuple[AscentTarget, ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -162,7 +153,8 @@ def compile_phase(
     level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
     frames = _frame_targets(phase, model, state, level)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
-    polygon, region = support(phase, model, state, points)
+    balance = [t for t in phase.soft_tasks if isinstance(t, BalanceTask)]
+    polygon, region = support(phase, model, state, points, wanted=bool(balance))
     coms = tuple(
         ComTarget(
             t.label,
@@ -175,6 +167,8 @@ def compile_phase(
         for t in phase.tasks
         if isinstance(t, ComTask)
     )
+    if polygon is not None:
+        coms += tuple(balance_target(t, polygon, state.com, np.zeros(3), level[id(t)]) for t in balance)
     joints = tuple(
         _joint_target(robot, t, q, given, t in phase.hard, level.get(id(t), 0), at)
         for t in phase.tasks
@@ -192,11 +186,12 @@ def compile_phase(
         damping,
         free,
         driven,
-        polygon,
+        None if phase.support is None else polygon,
         region,
         points,
         held,
         {**now, **phase.roles},
+        tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
     )
 
 

@@ -35,6 +35,7 @@ class Recorder:
         self._margin: list[float] = []
         self._phase: list[int] = []
         self._errors: list[dict[str, float]] = []
+        self._measures: list[dict[str, float]] = []
         self._worst: dict[str, float] = {}
         self._targets: list[dict[str, Array]] = []
         self._bodies: list[dict[str, Array]] = []
@@ -54,6 +55,7 @@ class Recorder:
             self._margin,
             self._phase,
             self._errors,
+            self._measures,
             self._targets,
             self._bodies,
         ):
@@ -78,6 +80,7 @@ class Recorder:
         self._phase.append(index)
         errors = stack.errors()
         self._errors.append(errors)
+        self._measures.append(stack.keep_measures()())
         for name, error in errors.items():
             self._worst[name] = max(error, self._worst.get(name, 0.0))
         self._targets.append(loop.targets())
@@ -143,6 +146,7 @@ class Recorder:
             bodies=_columns(self._bodies, 7),
             targets=_columns(self._targets, 7),
             errors={name: column[:, 0] for name, column in _columns(self._errors, 1).items()},
+            measures={name: column[:, 0] for name, column in _columns(self._measures, 1).items()},
         )
         microseconds = np.array(self._microseconds)
         report = {

@@ -12,6 +12,7 @@ from wbplan.bodies import Body, Carried
 from wbplan.contacts import Contact, Push
 from wbplan.errors import SpecError, listing
 from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.objectives import ManipulabilityTask, Objective
 from wbplan.obstacles import Obstacle
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
 from wbplan.state import State
@@ -44,9 +45,10 @@ def _levels_of(soft: Iterable[Any], what: str) -> tuple[Any, ...]:
     for k, level in enumerate(levels):
         if not level:
             raise SpecError(f"{what}[{k}]: expected one task or more in a level, got none")
-        if k < len(levels) - 1 and any(isinstance(t, DampingTask) for t in level):
+        stiff = [t.label for t in level if isinstance(t, DampingTask | ManipulabilityTask)]
+        if k < len(levels) - 1 and stiff:
             raise SpecError(
-                f"{what}[{k}]: a damping task would forbid the levels below all motion; put it in the last"
+                f"{what}[{k}]: {listing(stiff)} would forbid the levels below all motion; put it in the last"
             )
     return levels
 
@@ -139,6 +141,11 @@ class Phase:
                 raise SpecError(f"{at}.limits: more than one {kind.__name__}")
         if any(isinstance(t, DampingTask) for t in self.hard):
             raise SpecError(f"{at}.hard: a damping task forbids all motion; put it in soft")
+        objectives = [t.label for t in self.hard if isinstance(t, Objective)]
+        if objectives:
+            raise SpecError(
+                f"{at}.hard: {listing(objectives)} has no target to be met in full; put it in soft"
+            )
 
     @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:

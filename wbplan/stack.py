@@ -15,7 +15,6 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -23,11 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan import kernels
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
+from wbplan.ascent import Ascent
+from wbplan.blocks import RowBlock
+from wbplan.compiled import CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
+from wbplan.levels import Level
 from wbplan.paths import number
 from wbplan.posture import Posture
-from wbplan.rows import Rows
+from wbplan.rows import Rows, reach
 
 Array = NDArray[np.float64]
 
@@ -39,35 +41,6 @@ MARGIN_RESERVE = 1e-4
 
 #: Stands for no bound in the QP.
 UNBOUNDED = 1e20
-
-
-def reach(model: Any, frame: int) -> float:
-    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
-    if frame == WORLD:
-        return 0.0
-    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [
-        model.frames[frame].placement.translation
-    ]
-    return float(sum(np.linalg.norm(link) for link in links))
-
-
-@final
-@dataclass(frozen=True)
-class RowBlock:
-    """Inequality rows of one kind: consecutive rows of C.
-
-    Attributes:
-        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
-        span: where its rows stand.
-        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
-            gives one name a row, '' for a row that is not in use.
-    """
-
-    kind: str
-    unit: str
-    span: slice
-    keep: Callable[[], Callable[[], list[str]]]
 
 
 @final
@@ -82,10 +55,12 @@ class Stack:
             `rows` that are hard, then hard joints.
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
-        damping: what stands on the whole diagonal of H, at the last `assemble`.
         blocks: what the rows of C are.
+        levels: the soft tasks by priority; H and g are those of the first.
+        normals: (E, 2) of the support polygon's edges.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
+        ascents: manipulability tasks.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
 
@@ -98,11 +73,12 @@ class Stack:
         self.driven_step = np.zeros(len(self.driven))
         self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
         self.driving = bool(self._moving_driven)
-        self.drift, self.margin, self.damping = 0.0, np.inf, 0.0
+        self.drift, self.margin = 0.0, np.inf
         self._hard_rows()
         self._soft_rows()
         self._joint_box()
         self._polygon()
+        self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
 
     def _hard_rows(self) -> None:
         rows, nf = self.rows, len(self.free)
@@ -132,10 +108,10 @@ class Stack:
             rows.motion[soft],
         )
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
-        self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
+        self._curvature = 0.5 * self.levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
         self._soft_part = self._part(soft, self._soft, self._soft_given)
-        targets = [t for t in self.phase.joint_targets if not t.hard]
+        targets = sorted((t for t in self.phase.joint_targets if not t.hard), key=lambda t: t.level)
         self._posture_goal, self._posture_step = np.zeros((2, len(targets), nf - 6))
         self.postures = [
             Posture(t, self.free, self.dt, self._posture_goal[k], self._posture_step[k])
@@ -145,9 +121,23 @@ class Stack:
         for k, posture in enumerate(self.postures):
             self._stiffness[k] = posture.stiffness
         self._posture_pull = np.array([p.pull for p in self.postures])
-        self._diagonal = np.full(nf, REGULARISATION + self.phase.damping)
-        self._diagonal[6:] += self._stiffness.sum(axis=0)
-        self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
+        count = len(self.phase.phase.levels)
+        self.levels = [self._level(k, count, [t.level for t in targets]) for k in range(count)]
+        self.H, self.g = self.levels[0].H, self.levels[0].g
+
+    def _level(self, k: int, count: int, postures: list[int]) -> Level:
+        """The k-th level of soft tasks: where its rows and posture tasks stand."""
+        nf = len(self.free)
+        rows = slice(*np.searchsorted(self.rows.levels, (k, k + 1)))
+        tasks = slice(*np.searchsorted(postures, (k, k + 1)))
+        diagonal = np.full(nf, REGULARISATION + (self.phase.damping if k == count - 1 else 0.0))
+        diagonal[6:] += self._stiffness[tasks].sum(axis=0)
+        return Level(
+            self._soft[rows], self._weight[rows], self._soft_rhs[rows], self._soft_error[rows],
+            self._curvature[rows], self._pull[rows], diagonal, self._stiffness[tasks],
+            self._posture_pull[tasks], self._posture_goal[tasks], self._posture_step[tasks],
+            np.zeros((nf, nf)), np.zeros(nf),
+        )  # fmt: skip
 
     def _part(self, span: slice, out: Array, given: Array) -> tuple[Any, ...]:
         """Arguments of `kernels.rows` for a span of rows: all views, taken once."""
@@ -157,14 +147,14 @@ class Stack:
             rows.frame_groups, self.free, self.driven, self.driven_step, out, given,
         )  # fmt: skip
 
-    def _levers(self, soft: slice) -> Array:
-        """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
+    def levers(self, rows: slice) -> Array:
+        """Bound on each row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
         # A base on its feet moves by the legs that it stands on: their length is its lever arm.
         held = (t for t in self.phase.frame_targets if t.hard)
         standing = max((reach(model, t.frame) for t in held), default=0.0)
-        for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
+        for target, row in zip(self.rows.targets_of_rows[rows], self.rows.chosen[rows], strict=True):
             group = row // 3
             if not isinstance(target, FrameTarget):
                 levers.append(longest)
@@ -190,7 +180,7 @@ class Stack:
 
     def _polygon(self) -> None:
         polygon = self.phase.polygon
-        self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
+        self.normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
         self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
         edges = len(self._offsets)
         self.C, self.d = np.zeros((edges, len(self.free))), np.zeros(edges)
@@ -231,7 +221,7 @@ class Stack:
         """Kinematics, errors and margin at `q` for the targets as they stand now."""
         rows = self.rows
         self.kinematics.update(q)
-        self.drift, self.margin = rows.measure(self.kinematics, self._normals, self._offsets)
+        self.drift, self.margin = rows.measure(self.kinematics, self.normals, self._offsets)
         self.hard_error[: rows.hard] = rows.error[: rows.hard]
         for i, (joint, _, _) in enumerate(self.hard_joints):
             error = self.hard_joint_goal[i] - q[7 + joint]
@@ -249,11 +239,12 @@ class Stack:
         self.b[: rows.hard] += rows.motion[: rows.hard] - self._hard_given
         np.multiply(self._pull, self._soft_error, out=self._soft_rhs)
         self._soft_rhs += self._soft_motion - self._soft_given
-        self.damping = self.phase.damping + REGULARISATION + kernels.cost(
-            self._soft, self._weight, self._soft_rhs, self._soft_error, self._curvature, self._diagonal,
-            self._stiffness, self._posture_pull, self._posture_goal, self._posture_step, kin.q[self.q_index],
-            self.H, self.g,
-        )  # fmt: skip
+        joints = kin.q[self.q_index]
+        for level in self.levels:
+            level.assemble(joints)
+        for ascent in self.ascents:
+            ascent.update()
+            ascent.write(self.levels[-1].H, self.levels[-1].g)
         self.fill_box()
         support = self.phase.phase.support
         if support is not None:
@@ -262,13 +253,13 @@ class Stack:
     def _fill_polygon(self, margin: float, least: float) -> None:
         kin = self.kinematics
         kernels.polygon(
-            self._normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
+            self.normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
             margin + MARGIN_RESERVE, least, self.C, self.d,
         )  # fmt: skip
 
     def distances(self) -> Array:
         """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
-        gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
+        gaps: Array = self._offsets - self.normals @ self.kinematics.com[:2]
         return gaps
 
     def fill_box(self) -> None:
@@ -298,6 +289,11 @@ class Stack:
         if support is not None:
             self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
         self.driven_step[:] = given
+
+    @property
+    def reaches(self) -> Array:
+        """(nf - 6,) how far [m or rad] the speed limit lets each free joint move in one tick."""
+        return self._reach
 
     def reach(self, column: int) -> float:
         """How far [m or rad] the speed limit lets a free column move in one tick."""
@@ -363,6 +359,14 @@ class Stack:
             self._name_errors, self.rows.error.copy(), self.hard_error[self.rows.hard :].copy(),
             self._posture_goal - joints,
         )  # fmt: skip
+
+    def keep_measures(self) -> Callable[[], dict[str, float]]:
+        """What is reported of this moment beside errors, to be worked out whenever somebody asks.
+
+        Keys: '<task>.manipulability', w of a manipulability task.
+        """
+        q, ascents = self.kinematics.q.copy(), self.ascents
+        return lambda: {f"{ascent.label}.manipulability": ascent.value_at(q) for ascent in ascents}
 
     def _name_errors(self, error: Array, hard_joints: Array, postures: Array) -> dict[str, float]:
         found = {f"{label}.{part}": _norm(error[span]) for label, part, span in self.rows.labels}

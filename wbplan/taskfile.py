@@ -20,6 +20,7 @@ from typing import Any, Literal, Union, final, get_args, get_origin
 
 from wbplan import catalog
 from wbplan.errors import SpecError, WbplanError, listing
+from wbplan.robot.reading import is_file, is_folder
 from wbplan.script import Script
 
 _SUPPORTED = "float, int, bool, str, tuple of these, Literal[...], or one of these | None"
@@ -142,8 +143,8 @@ def find_task(name_or_path: str | Path) -> Path:
     """
     path = Path(name_or_path).expanduser()
     if path.suffix == ".py" or len(path.parts) > 1:
-        if not path.is_file():
-            what = "is a folder" if path.is_dir() else "does not exist"
+        if not is_file(path):
+            what = "is a folder" if is_folder(path) else "does not exist"
             raise SpecError(f"task file '{path}' {what}; expected a Python file")
         return path
     shipped = catalog.tasks()
@@ -219,6 +220,8 @@ def type_name(annotation: Any) -> str:
         return "one of " + ", ".join(map(str, get_args(annotation)))
     if get_origin(annotation) is tuple:
         kinds = get_args(annotation)
+        if not kinds:
+            return "no value at all"
         if kinds[-1] is Ellipsis:
             return f"{type_name(kinds[0])}s separated by commas"
         return f"{len(kinds)} values separated by commas ({', '.join(map(type_name, kinds))})"

@@ -205,7 +205,7 @@ def test_a_duration_is_finite_and_positive(duration: Any) -> None:
         ({"soft": [[wb.ComTask()], [wb.ComTask()]]}, "named more than once: com"),
         (
             {"soft": [[wb.DampingTask()], [wb.ComTask()]]},
-            r"phase 'p'\.soft\[0\]: a damping task would forbid the levels below all motion",
+            r"phase 'p'\.soft\[0\]: damping would forbid the levels below all motion",
         ),
         ({"hard": [wb.DampingTask()]}, r"phase 'p'\.hard: a damping task forbids all motion; put it in soft"),
     ],

@@ -21,7 +21,9 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, CompiledPhase, ComTarget, FrameTarget
+from wbplan.aims import ComTarget
+from wbplan.backends.placo_ascent import PlacoAscent
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.qp import Solution
@@ -50,6 +52,13 @@ class PlacoBackend:
         names = list(self._robot.model.names)[2:]
         if names != list(phase.robot.joint_names):
             raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
+        self._names = [frame.name for frame in phase.model.frames]
+        for frame in stack.rows.frames:
+            if self._names.count(self._names[frame]) > 1:
+                raise SpecError(
+                    f"backend 'placo' knows frames by name only, and a link and a joint are both called "
+                    f"'{self._names[frame]}'; rename the joint, or use backend 'proxqp'"
+                )
         self._soft_labels: set[str] = set()
         self._patient = False
         self._widened: set[int] = set()
@@ -70,6 +79,7 @@ class PlacoBackend:
         self._joints_given()
         self._com_tasks()
         self._posture_tasks()
+        self._ascents = [PlacoAscent(ascent, stack, solver) for ascent in stack.ascents]
         self._limits()
 
     def _priority(self, label: str, hard: bool, weight: float) -> tuple[str, float]:
@@ -79,7 +89,7 @@ class PlacoBackend:
 
     def _frame_tasks(self, target: FrameTarget, *, rotation: bool) -> list[Any]:
         """One PlaCo task for each distinct weight among the axes."""
-        names = [f.name for f in self._stack.phase.model.frames]
+        names = self._names
         frame, solver = names[target.frame], self._solver
         weights = target.rotation_weight if rotation else target.position_weight
         tasks = []
@@ -259,6 +269,10 @@ class PlacoBackend:
             goals = posture.next_goal(joints)[columns].tolist()
             for name, goal in zip(names, goals, strict=True):
                 task.set_joint(name, goal)
+        if self._ascents:
+            stack.kinematics.differentiate()
+        for ascent in self._ascents:
+            ascent.aim()
         for k, j, name, task in self._driven:
             task.set_joint(name, float(stack.kinematics.q[j] + stack.driven_step[k]))
         for (task, name), goal in zip(self._hard_joints, stack.hard_joint_goal, strict=True):

@@ -12,9 +12,10 @@ import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
+from wbplan.backends.cascade import Cascade
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
-from wbplan.qp import Multipliers, Solution
+from wbplan.qp import LevelSolution, Multipliers, Solution
 from wbplan.stack import UNBOUNDED, Stack
 
 Array = NDArray[np.float64]
@@ -29,6 +30,7 @@ class ProxqpBackend:
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
         self._guess = ActiveSetGuess(stack)
+        self._cascade = Cascade(stack) if len(stack.levels) > 1 else None
         self._qp = self._new_solver()
         self._started = False
         self._unbounded = np.full(len(stack.d), -UNBOUNDED)
@@ -40,7 +42,7 @@ class ProxqpBackend:
         qp.settings.eps_abs = 1e-8
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
-        qp.settings.max_iter = 200
+        qp.settings.max_iter = qp.settings.max_iter_in = 200  # inner ones go to 1500 for each outer otherwise
         qp.settings.check_duality_gap = False
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
         qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
@@ -51,11 +53,15 @@ class ProxqpBackend:
         s = self._stack
         s.assemble()
         x, multipliers = self._guess.solve() or self._ask_solver()
+        levels: tuple[LevelSolution, ...] = ()
+        if self._cascade is not None:
+            levels = (LevelSolution(x, multipliers), *self._cascade.solve(x, multipliers))
+            x = levels[-1].x
         step = self._rest.copy()
         step[s.free] = np.minimum(np.maximum(x, s.lower), s.upper)
         if s.driving:
             step[s.driven] = s.driven_step
-        return Solution(step, multipliers)
+        return Solution(step, multipliers, levels)
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
@@ -86,5 +92,5 @@ class ProxqpBackend:
     def _retry(self) -> bool:
         """Once more from nothing, with patience: a warm start may be a bad one."""
         self._qp, self._started = self._new_solver(), False
-        self._qp.settings.max_iter = 2000
+        self._qp.settings.max_iter = 1000
         return self._run()

@@ -34,6 +34,7 @@ class Trajectory:
             nan while it has none.
         targets: task name -> (N, 7) the pose that it was asked for, world; nan where it was not.
         errors: "<task>.position" [m], "<task>.orientation" [rad] ... -> (N,); nan where absent.
+        measures: "<task>.manipulability" [-] -> (N,); nan where absent.
     """
 
     time: Array
@@ -46,6 +47,7 @@ class Trajectory:
     bodies: Mapping[str, Array] = field(default_factory=dict)
     targets: Mapping[str, Array] = field(default_factory=dict)
     errors: Mapping[str, Array] = field(default_factory=dict)
+    measures: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -151,7 +153,11 @@ class Bundle:
             BundleError: naming the file and the field at fault.
         """
         folder = Path(folder)
-        if not folder.is_dir():
+        try:
+            is_folder = folder.is_dir()
+        except OSError as error:
+            raise BundleError(f"{folder}: cannot be read: {error.strerror or error}") from error
+        if not is_folder:
             found = "a file" if folder.is_file() else "nothing"
             raise BundleError(f"{folder}: expected a folder with a plan bundle, found {found}")
         plan = files.read_plan(folder / files.PLAN)
@@ -213,4 +219,5 @@ def _trajectory(arrays: Mapping[str, NDArray[Any]], where: str) -> Trajectory:
         bodies=groups["bodies"],
         targets=groups["targets"],
         errors=groups["errors"],
+        measures=groups["measures"],
     )

@@ -24,9 +24,11 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors"}  #: prefix in the file -> field
+#: Prefix in the file -> field.
+GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
+MOST = 1e12  #: no length, time, mass or speed of a plan comes near this; squares of larger numbers overflow
 EDGE = 1e-9  #: [s], two times nearer than this are one
 END = 1e-6  #: [s], how far the last phase may end from the last sample
 
@@ -53,6 +55,13 @@ def check_urdf(model: Any, where: str) -> None:
             raise BundleError(
                 f"{where}: joint {model.names[index]} has {model.joints[index].nv} axes; expected 1"
             )
+    placed = [joint.translation for joint in model.jointPlacements] + [
+        f.placement.translation for f in model.frames
+    ]
+    weighed = [[i.mass, *i.lever, *i.inertia.ravel()] for i in model.inertias]
+    for what, numbers in (("origin", np.array(placed)), ("inertial", np.array(weighed))):
+        if not (np.abs(numbers) <= MOST).all():
+            raise BundleError(f"{where}: a number of an {what} is not finite, or beyond {MOST:g}")
     if not pin.computeTotalMass(model) > 0.0:
         raise BundleError(f"{where}: the robot has no mass: {pin.computeTotalMass(model)} kg")
 
@@ -94,6 +103,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
         array = _array(motion, key)
@@ -101,9 +111,9 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
             raise BundleError(f"{where}: {key}: expected shape {shape}, found {array.shape}")
         if key == "phase" and array.dtype.kind not in "iu":
             raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
-        # A margin, object, target or error may be absent at a sample; all else is there or broken.
-        if values and key in ("time", "q", "v", "com") and not np.isfinite(array).all():
-            at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        # A margin, object, target, error or measure may be absent at a sample; all else is there or broken.
+        if values and key in ("time", "q", "v", "com") and not (np.abs(array) <= MOST).all():
+            at = tuple(int(i) for i in np.argwhere(~(np.abs(array) <= MOST))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
 
 
@@ -165,7 +175,7 @@ class _Field:
             value = float(self.value)
         except (OverflowError, TypeError):  # a whole number of hundreds of digits; a complex number
             value = math.nan
-        if not (math.isfinite(value) and value >= least):
+        if not (abs(value) <= MOST and value >= least):
             raise self.fail("a finite number" + (f" of at least {least:g}" if least > -math.inf else ""))
         return value
 
@@ -209,7 +219,8 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["joint_acceleration"].fail("bounds of at least 0")
     for body in root["bodies"].items() if "bodies" in root else ():
         body["name"].text()
-        body["size"].vector(3)
+        if not (body["size"].vector(3) > 0.0).all():
+            raise body["size"].fail("three lengths above 0")
         body["mass"].number(0.0)
 
 

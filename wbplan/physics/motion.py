@@ -214,6 +214,11 @@ def _offsets(
     edge = np.diff(record.phase, prepend=record.phase[:1]) != 0
     chosen = np.flatnonzero((np.diff(kept, prepend=-1.0) > 0) | edge | np.append(edge[1:], True))
     effort = np.asarray(model.effortLimit[6:], dtype=np.float64)
+    if not (np.isfinite(effort) & (effort > 0.0)).all():
+        weak = bundle.trajectory.joint_names[int(np.argmin(np.isfinite(effort) & (effort > 0.0)))]
+        raise PhysicsError(
+            f"robot.urdf: joint '{weak}': <limit effort> has to be above 0 for a servo to hold it"
+        )
     torques = np.zeros((len(chosen), len(effort)))
     for row, k in enumerate(chosen):
         phase = bundle.phases[int(record.phase[k])]

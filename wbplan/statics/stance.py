@@ -19,15 +19,19 @@ from wbplan.tasks import FrameTask
 Array = NDArray[np.float64]
 
 
-def support(phase: Phase, model: Any, state: State, points: Array) -> tuple[HalfPlanes | None, bool]:
+def support(
+    phase: Phase, model: Any, state: State, points: Array, *, wanted: bool = False
+) -> tuple[HalfPlanes | None, bool]:
     """The polygon that a phase's CoM keeps to, and whether it is a region rather than the contacts' hull.
+
+    None where the phase has no such limit, unless it is `wanted` all the same.
 
     Raises:
         SpecError: the contacts hold the robot nowhere, or a push is not what it has to be.
     """
     at = f"phase '{phase.name}'"
     load = push_load(phase, model, state)
-    if phase.support is None:
+    if phase.support is None and not wanted:
         return None, False
     normals = np.array([c.normal for c in phase.contacts]).reshape(-1, 3)
     friction = np.array([c.friction for c in phase.contacts])
