@@ -25,10 +25,11 @@ ROBOT = "legarm_hexapod"
 ARM = "limb1"
 HAND = f"{ARM}_tip"
 PADS = (f"{ARM}_pad_a", f"{ARM}_pad_b")
-SIZE = (0.024, 0.008, 0.040)  # of the object [m]: along the gripper, across it, upright
+SIZE = (0.024,0.008,0.040)  # of the object [m]: along the gripper, across it, upright
 ABOVE = 0.025  # over its stand, from where the object is lowered [m]
 REACH = 0.030  # from the palm to the object's middle [m]
 GRAB = (150.0, -42.0, 35.0, 7.0, -20.0)  # joints 1 to 5 [degrees] that reach for it: arm and tool level
+AWAY = (110.0, -48.0, 38.0, 12.0, -20.0)  # likewise, turned away from what it has put down
 CLEAR = (120.0, -15.0, 50.0)  # joints 1 to 3 of the limb as a leg in the air
 ORDER = (("joint4", "shank2"), ("joint5", "finger_a", "finger_b"))  # else the arm would hit its own shank
 TOUR = (  # joints 1 to 5 of the poses through which the object is carried
@@ -50,7 +51,7 @@ def script(
     step_time: float = 1.0,
     margin: float = 0.06,
     mass: float = 0.1,
-    grip: float = 10.0,
+    grip: float = 10,
     friction: float = 0.7,
 ) -> wb.Script:
     """The experiment's steps (a) to (i).
@@ -105,7 +106,8 @@ def script(
     def fingers(value: float, seconds: float) -> dict[str, wb.Path]:
         return {f"{ARM}_finger_{letter}": wb.MinJerk(wb.AS_IS, value, seconds) for letter in "ab"}
 
-    out, back = folding.out(made.steps[rises - 1].support[ARM]), folding.back()
+    out = folding.out(made.steps[rises - 1].support[ARM])
+    back = replace(folding, pose=_joints(AWAY)).back()
     acts: dict[int, Any] = {rises + k: fields for k, fields in enumerate(out)}
     near = rises + len(out)  # first step as an arm
     takes = near + 2
@@ -167,8 +169,8 @@ def _held() -> Any:
 def _finger(half: float, ahead: float) -> float:
     """Angle [rad] at which a finger's rubber face meets an edge `half` [m] beside the hand's axis.
 
-    The face is 8 mm inside the line from the finger's hinge, which is 9 mm beside the axis and 9 mm behind the
-    palm; the edge is `ahead` [m] of the palm.
+    The face is 8 mm inside the line from the finger's hinge, which is 9 mm beside the axis and 9 mm behind
+    the palm; the edge is `ahead` [m] of the palm.
     """
     x, y = ahead + 0.009, half - 0.009
     return math.asin(0.008 / math.hypot(x, y)) + math.atan2(y, x)

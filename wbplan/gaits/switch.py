@@ -1,8 +1,8 @@
 """Changing a limb between leg and arm while the robot walks (Zheng, section 4.1, figures 14 and 15).
 
-Six feet stand on a regular hexagon, five on a regular pentagon of the same circle, with a side of it towards
-the arm. One tripod steps to its places of the new polygon, then the other one does while the arm's foot leaves
-the ground, or comes back to it. The body keeps going.
+Six feet stand on a regular hexagon, five on a regular pentagon of the same circle, with a side of it
+towards the arm. One tripod steps to its places of the new polygon, then the other one does while the arm's
+foot leaves the ground, or comes back to it. The body keeps going.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wbplan.errors import SpecError, listing
 from wbplan.gaits.gait import Gait
 from wbplan.gaits.library import pentapod
+from wbplan.gaits.manipulation import beside_way
 from wbplan.gaits.schedule import Beat, Ground, Schedule, Step, flat
 from wbplan.gaits.stance import Stance, Walker
 from wbplan.gaits.walking import Manner, Walk, build
@@ -263,8 +264,9 @@ def perform(
 ) -> Walk:
     """Phases of a schedule in which a limb is an arm for a while.
 
-    Beside what `build` does: a foot that comes out of the air lands from where it is, and a step's fields may
-    hold 'body', tasks that stand for the builder's own on the body.
+    Beside what `build` does: a foot that comes out of the air lands from where it is; while a limb is raised
+    the body keeps to its own nominal way, since the centre of mass moves with the limb; and a step's fields
+    may hold 'body', tasks that stand for these.
 
     Args:
         switch: the stances; the walk starts on the hexagon.
@@ -297,10 +299,14 @@ def perform(
         )
         for limb in set(made.steps[k].swing) - before:
             phase = _landing(phase, switch.walker.robot.feet[limb])
-        if "body" in acts.get(k, {}):
-            own = tuple(acts[k].get("soft", ()))
+        given, step = acts.get(k, {}), made.steps[k]
+        if "body" in given or step.raised:
+            body = given.get("body") or beside_way(
+                switch.walker, made.course, step.begin, switch.height, across=30.0
+            )
+            own = tuple(given.get("soft", ()))
             soft = [item for item in phase.soft if item in own or not _moves_body(item, switch.walker.root)]
-            phase = replace(phase, soft=(*soft, *acts[k]["body"]))
+            phase = replace(phase, soft=(*soft, *body))
         phases[i] = phase
     return replace(walk, phases=tuple(phases))
 
