@@ -51,6 +51,7 @@ LAYERS = [
     "physics",
     "recorder",
     "planner",
+    "survey",
     "taskfile",
     "papers",
     "bench",

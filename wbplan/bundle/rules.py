@@ -24,8 +24,16 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-#: Prefix in the file -> field.
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
+OPTIONAL = ("torque", "push")
+#: prefix in the file -> field
+GROUPS = {
+    "body": "bodies",
+    "target": "targets",
+    "error": "errors",
+    "measure": "measures",
+    "force": "forces",
+    "moment": "moments",
+}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 MOST = 1e12  #: no length, time, mass or speed of a plan comes near this; squares of larger numbers overflow
@@ -103,6 +111,10 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"force_{name}": (samples, 3) for name in motion.forces},
+        **{f"moment_{name}": (samples, 3) for name in motion.moments},
+        **({} if motion.torque is None else {"torque": (samples, model.nv - 6)}),
+        **({} if motion.push is None else {"push": (samples,)}),
         **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
@@ -259,10 +271,11 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for key in ("friction", "patch", "squeeze"):
+            if key in item:
+                item[key].number(0.0)
         for pad in item["pads"].items() if "pads" in item else ():
             pad.frame(model)
-        if "squeeze" in item:
-            item["squeeze"].number(0.0)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:
@@ -270,6 +283,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
     for push in phase["pushes"].items() if "pushes" in phase else ():
         push["frame"].frame(model)
         push["force"].vector(3)
+    for key in ("friction_use", "torque_use"):
+        if key in phase:
+            phase[key].number(0.0)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 

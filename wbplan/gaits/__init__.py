@@ -1,15 +1,19 @@
 """Walking: gaits as data, their margins and speeds, stances, swings, tracks, and phases made of them."""
 
+from wbplan.gaits.building import Manner, Walk, build
+from wbplan.gaits.figures import cycle_figure
 from wbplan.gaits.gait import Gait
+from wbplan.gaits.ground import firm, over
 from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
 from wbplan.gaits.manipulation import SHIFT, WithBody, beside_way, nominal, shifts
 from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
+from wbplan.gaits.reach import comfortable, room, roomiest
 from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
 from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.gaits.switch import Switch, Unfolding, perform
 from wbplan.gaits.tracks import Track, arc, on_the_spot, straight, through
-from wbplan.gaits.walking import Manner, Walk, build, walk
+from wbplan.gaits.walking import gait_for, walk
 
 __all__ = [
     "ANT",
@@ -40,15 +44,20 @@ __all__ = [
     "beside_way",
     "best_margin",
     "build",
+    "comfortable",
     "course_of",
     "crawls",
+    "cycle_figure",
     "cycle_margins",
+    "firm",
     "flat",
+    "gait_for",
     "gait_named",
     "gaits_of",
     "mode_named",
     "nominal",
     "on_the_spot",
+    "over",
     "pentagon",
     "pentapod",
     "perform",
@@ -56,6 +65,8 @@ __all__ = [
     "quadrangular",
     "regular_stance",
     "require",
+    "room",
+    "roomiest",
     "schedule",
     "shifts",
     "step_margins",

@@ -188,7 +188,7 @@ def grip_of(span: Span, friction: Array, options: Options) -> float:
 
 
 def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> float:
-    """With n pads, friction alone holds a weight alone where n mu F >= m g; `safety` times that."""
+    """What the plan says; else `safety` times what holds a weight by friction alone: n mu F >= m g."""
     if len(span.pads) < 2 or options.weld:
         return 0.0
     if options.squeeze is not None:

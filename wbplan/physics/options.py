@@ -73,7 +73,7 @@ class Options:
         reserve: share of the feet's friction that the static load may use.
         ground: friction of objects on the ground and on what they stand on.
         squeeze: force [N] with which each pad presses while something is carried; None takes the plan's, or
-            else `safety` times what friction needs to hold the weight.
+            where it has none `safety` times what friction needs to hold the weight.
         safety: see `squeeze`.
         ramp: seconds over which the squeeze comes before the carrying starts, and goes after it has ended.
         weld: carried objects are fastened to their holders instead of held by friction.
