@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.errors import SpecError, listing
+from wbplan.gaits.building import Manner, Walk, build
 from wbplan.gaits.gait import Gait
 from wbplan.gaits.library import pentapod
 from wbplan.gaits.manipulation import beside_way
 from wbplan.gaits.schedule import Beat, Ground, Schedule, Step, flat
 from wbplan.gaits.stance import Stance, Walker
-from wbplan.gaits.building import Manner, Walk, build
 from wbplan.paths import AS_IS, MinJerk, name_of, number
 from wbplan.script import Phase
 from wbplan.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task

@@ -175,8 +175,10 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
                 spans[spans.index(last)] = replace(last, end=end)
             else:
-                grip = (item.get("friction"), item["frame"], item.get("squeeze"), bool(item.get("pads")))
-                spans.append(Span(item["name"], start, end, pads, *grip))
+                friction, squeeze = item.get("friction"), item.get("squeeze", item.get("press"))
+                fingers = bool(item.get("pads"))
+                held = Span(item["name"], start, end, pads, friction, item["frame"], squeeze, fingers)
+                spans.append(held)
     return tuple(spans)
 
 
