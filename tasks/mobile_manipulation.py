@@ -26,7 +26,7 @@ ARM = "limb1"
 HAND = f"{ARM}_tip"
 PADS = (f"{ARM}_pad_a", f"{ARM}_pad_b")
 SIZE = (0.024, 0.008, 0.040)  # of the object [m]: along the gripper, across it, upright
-ABOVE = 0.025  # over its stand, from where the object is lowered [m]
+ABOVE = 0.03  # over its stand, from where the object is lowered [m]
 REACH = 0.030  # from the palm to the object's middle [m]
 GRAB = (150.0, -42.0, 35.0, 7.0, -20.0)  # joints 1 to 5 [degrees] that reach for it: arm and tool level
 AWAY = (110.0, -48.0, 38.0, 12.0, -20.0)  # likewise, turned away from what it has put down
@@ -116,6 +116,7 @@ def script(
     up = pin.SE3(np.eye(3), np.array([0.0, 0.0, ABOVE]))
     before = pin.SE3(np.eye(3), np.array([-0.06, 0.0, 0.0]))
     thing = wb.Body("object", mass=mass, size=SIZE, pose=grasp * _held())
+    wide = robot.roles[ARM]["arm"][f"{ARM}_finger_a"]
     shut = _finger(SIZE[1] / 2.0, REACH - SIZE[0] / 2.0)
     held = {
         "carried": [wb.Carried(thing, by=HAND, pads=PADS, squeeze=grip)],
@@ -130,7 +131,7 @@ def script(
         acts[k] = reach(k, wb.gaits.WithBody(made.course, made.steps[k].begin, goal, height), **held)
     acts[puts] = reach(puts, wb.MinJerk(wb.AS_IS, up * place, step_time), **held)
     acts[puts + 1] = reach(puts + 1, wb.MinJerk(wb.AS_IS, place, step_time), **held)
-    acts[puts + 2] = reach(puts + 2, wb.Hold(place), driven=fingers(math.pi / 2.0, 0.7 * step_time))
+    acts[puts + 2] = reach(puts + 2, wb.Hold(place), driven=fingers(wide, 0.7 * step_time))
     acts[puts + 3] = reach(puts + 3, wb.MinJerk(wb.AS_IS, place * before, step_time))
     acts |= {puts + 4 + k: fields for k, fields in enumerate(back)}
     acts |= {k: {"soft": (folding.posture(_joints(CLEAR)),)} for k in range(puts + 4 + len(back), lands - 1)}
