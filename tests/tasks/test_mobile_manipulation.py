@@ -51,7 +51,7 @@ def test_zheng_fig_16_margins_over_the_switch(plan: wb.Plan) -> None:
     """Margins that the walk has stand below the paper's at the centre, 0.5 and 0.309 CR, by what it walks."""
     margin, phase = plan.trajectory.margin / RADIUS, plan.trajectory.phase
     assert margin.min() * RADIUS >= 0.06
-    tripod = [k for k in phases(plan, "a")[1:-1]]
+    tripod = phases(plan, "a")[1:-1]
     assert np.isin(phase, tripod).any()
     assert 0.42 < margin[np.isin(phase, tripod)].min() < 0.5
     three = [k for k in phases(plan, "f") if len(support(plan, k)) == 3]

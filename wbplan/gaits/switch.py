@@ -294,13 +294,11 @@ def perform(
         k = numbers.get(phase.name)
         if k is None:
             continue
-        before = (
-            set(made.steps[k - 1].support) | set(made.steps[k - 1].swing) if k else set(made.steps[k].swing)
-        )
-        for limb in set(made.steps[k].swing) - before:
+        lands = set(made.steps[k - 1].raised if k else ()) & set(made.steps[k].swing)
+        for limb in lands:
             phase = _landing(phase, switch.walker.robot.feet[limb])
         given, step = acts.get(k, {}), made.steps[k]
-        if "body" in given or step.raised:
+        if "body" in given or step.raised or lands:
             body = given.get("body") or beside_way(
                 switch.walker, made.course, step.begin, switch.height, across=30.0
             )

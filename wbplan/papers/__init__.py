@@ -16,6 +16,7 @@ from wbplan.papers import (
     mana_simulated,
     zheng,
     zheng_case,
+    zheng_switch,
     zhuang,
 )
 from wbplan.papers.rows import DIFFERS, Row
@@ -24,7 +25,7 @@ __all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
 
 PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES + mana_simulated.TABLES,
-    "zheng": zheng.TABLES + zheng_case.TABLES,
+    "zheng": zheng.TABLES + zheng_case.TABLES + zheng_switch.TABLES,
     "hexpiderix": hexpiderix.TABLES,
     "hiphant": hiphant.TABLES + hiphant_motion.TABLES,
     "zhuang": zhuang.TABLES,
