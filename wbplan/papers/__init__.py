@@ -16,8 +16,10 @@ from wbplan.papers import (
     mana_simulated,
     zheng,
     zheng_case,
+    zheng_gaits,
     zheng_switch,
     zhuang,
+    zhuang_gaits,
 )
 from wbplan.papers.rows import DIFFERS, Row
 
@@ -25,10 +27,10 @@ __all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
 
 PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES + mana_simulated.TABLES,
-    "zheng": zheng.TABLES + zheng_case.TABLES + zheng_switch.TABLES,
+    "zheng": zheng.TABLES + zheng_case.TABLES + zheng_gaits.TABLES + zheng_switch.TABLES,
     "hexpiderix": hexpiderix.TABLES,
     "hiphant": hiphant.TABLES + hiphant_motion.TABLES,
-    "zhuang": zhuang.TABLES,
+    "zhuang": zhuang.TABLES + zhuang_gaits.TABLES,
 }
 """Paper -> its tables, each a function that computes the rows."""
 
