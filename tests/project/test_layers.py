@@ -47,6 +47,7 @@ LAYERS = [
     "retract",
     "backends",
     "tick",
+    "fallback",
     "bundle",
     "checks",
     "plots",
