@@ -46,6 +46,7 @@ LAYERS = [
     "tick",
     "bundle",
     "checks",
+    "measures",
     "plots",
     "view",
     "physics",
