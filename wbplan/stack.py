@@ -290,14 +290,29 @@ class Stack:
             self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
         self.driven_step[:] = given
 
-    @property
-    def reaches(self) -> Array:
-        """(nf - 6,) how far [m or rad] the speed limit lets each free joint move in one tick."""
-        return self._reach
-
     def reach(self, column: int) -> float:
         """How far [m or rad] the speed limit lets a free column move in one tick."""
         return float(self._reach[column - 6])
+
+    def box_kind(self, column: int, *, up: bool) -> str:
+        """What makes a free column's bound: 'position' or 'speed'."""
+        bound = self.upper[column] if up else -self.lower[column]
+        return "speed" if bound >= self._reach[column - 6] * (1.0 - 1e-9) else "position"
+
+    def relaxed_box(self, column: int, kind: str, by: float, *, up: bool) -> tuple[Array, Array]:
+        """Lower and upper as they would be were a limit of one joint wider by so much [rad, m, or per s]."""
+        kept, j = (self._q_lower.copy(), self._q_upper.copy(), self._reach.copy()), column - 6
+        if kind == "speed":
+            self._reach[j] += by * self.dt
+        elif up:
+            self._q_upper[j] += by
+        else:
+            self._q_lower[j] -= by
+        self.fill_box()
+        moved = self.lower.copy(), self.upper.copy()
+        self._q_lower, self._q_upper, self._reach = kept
+        self.fill_box()
+        return moved
 
     # -- names -------------------------------------------------------------------------------------------
 

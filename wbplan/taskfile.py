@@ -1,7 +1,8 @@
 """Task files: one experiment each, found by name or path, its parameters read from their annotations.
 
 A task file has a docstring (what, source), `ROBOT = "name"` and
-`def script(robot, *, parameter: float = default, ...) -> wb.Script`.
+`def script(robot, *, parameter: float = default, ...) -> wb.Script`. One that is written for several robots
+has `ROBOTS = ("name", ...)` too, or `ROBOTS = "any"`.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ class TaskFile:
         name: the file's name without `.py`.
         path: the file.
         robot: name or path of the robot it is written for, its `ROBOT`.
+        robots: all that it may be run with; None: any.
         docstring: what it does, and its source.
         parameters: what `script` takes beside the robot.
         function: its `script`.
@@ -81,6 +83,7 @@ class TaskFile:
     name: str
     path: Path
     robot: str
+    robots: tuple[str, ...] | None
     docstring: str
     parameters: tuple[Parameter, ...]
     function: Callable[..., Any]
@@ -89,6 +92,18 @@ class TaskFile:
     def summary(self) -> str:
         """The docstring's first line."""
         return first_line(self.docstring)
+
+    def robot_for(self, name: str | None) -> str:
+        """Name or path of the robot to run it with: its own, or another that it is written for too.
+
+        Raises:
+            SpecError: it is not written for that one.
+        """
+        if name is None or self.robots is None or name in self.robots:
+            return name or self.robot
+        raise SpecError(
+            f"task '{self.name}' is not written for robot '{name}'; it is for: {listing(self.robots)}"
+        )
 
     def values(self, settings: Sequence[str]) -> dict[str, Any]:
         """Every parameter's value: the default, or what is set.
@@ -185,6 +200,7 @@ def load_task(name_or_path: str | Path) -> TaskFile:
         name=path.stem,
         path=path,
         robot=_beside(robot, path),
+        robots=_robots(module, robot, path),
         docstring=ast.get_docstring(tree) or "",
         parameters=_parameters(function, path),
         function=function,
@@ -247,6 +263,16 @@ def _beside(robot: str, path: Path) -> str:
     if not robot.endswith(".urdf") or Path(robot).is_absolute():
         return robot
     return str(path.parent / robot)
+
+
+def _robots(module: types.ModuleType, robot: str, path: Path) -> tuple[str, ...] | None:
+    """All robots that a task may be run with; None: any."""
+    given = getattr(module, "ROBOTS", (robot,))
+    if given == "any":
+        return None
+    if not isinstance(given, tuple | list) or not all(isinstance(name, str) and name for name in given):
+        raise SpecError(f'{path}: ROBOTS: expected names of robots or "any", got {given!r}')
+    return tuple(_beside(name, path) for name in dict.fromkeys((robot, *given)))
 
 
 def _parameters(function: Callable[..., Any], path: Path) -> tuple[Parameter, ...]:
