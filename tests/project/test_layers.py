@@ -29,6 +29,7 @@ LAYERS = [
     "aims",
     "compiled",
     "kinematics",
+    "collision",
     "kernels",
     "sampling",
     "gaits",
