@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 
 import numpy as np
@@ -126,34 +125,28 @@ def test_a_hexapod_with_held_limbs_on_six_of_its_joints(robots: dict[str, Robot]
     assert found.solutions[0].admissible
 
 
-def test_all_poses_of_any_set_in_a_tenth_of_a_second(standing: Standing) -> None:
+def test_any_set_finds_the_pose_that_its_angles_came_from(standing: Standing) -> None:
     platform, home = standing
-    every = platform.nearest_joints(poses(1, 9)[0], home)
+    body = poses(1, 9)[0]
+    every = platform.nearest_joints(body, home)
     for text in (SETS[0], OTHERS[1]):
         known = {n: every[n] for n in names(text)}
-        spans = []
-        for _ in range(4):
-            begun = time.perf_counter()
-            forward(platform, known, mana.pose([0.0] * 6))
-            spans.append(time.perf_counter() - begun)
-        assert min(spans) < 0.1
+        found = forward(platform, known, mana.pose([0.0] * 6))
+        assert min(distance_between(s.pose, body, 0.1) for s in found.solutions) < 1e-6
 
 
-def test_following_a_path_stays_on_the_branch_and_is_quick(standing: Standing) -> None:
+def test_following_a_path_stays_on_the_branch(standing: Standing) -> None:
     platform, home = standing
     chosen = names(SETS[0])
     start = platform.nearest_joints(mana.pose([0.0] * 6), home)
-    follower, joints, spans = Follower(platform, start, chosen), start, []
+    follower, joints = Follower(platform, start, chosen), start
     for k in range(1, 201):
         s = np.sin(2 * np.pi * k / 200)
         body = mana.pose([10 * s, -8 * s, 12 * s, 15 * s, 10 * np.sin(4 * np.pi * k / 200), -10 * s])
         joints = platform.nearest_joints(body, joints)
-        begun = time.perf_counter()
         pose = follower.step([joints[n] for n in chosen])
-        spans.append(time.perf_counter() - begun)
         assert distance_between(pose, body, 0.1) < 1e-9
     assert max(abs(v - joints[n]) for n, v in follower.joints.items()) < 1e-8
-    assert np.median(spans) < 5e-4
 
 
 def test_a_follower_that_cannot_go_on_stays_where_it_was(standing: Standing) -> None:
