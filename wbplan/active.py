@@ -24,7 +24,7 @@ class Active:
 
     Attributes:
         name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
-        kind: 'position', 'speed', 'margin' or 'hard'.
+        kind: 'position', 'speed', 'acceleration', 'jerk', 'margin' or 'hard'.
         multiplier: Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver has none.
     """
 
@@ -45,10 +45,11 @@ class HeldBack:
         solution: the step, just taken.
     """
 
-    __slots__ = ("_distances", "_lower", "_multipliers", "_pull", "_stack", "_step", "_upper")
+    __slots__ = ("_distances", "_history", "_lower", "_multipliers", "_pull", "_stack", "_step", "_upper")
 
     def __init__(self, stack: Stack, solution: Solution) -> None:
         self._stack, self._step = stack, solution.step
+        self._history = stack.box.history()
         self._lower, self._upper = stack.lower.copy(), stack.upper.copy()
         self._multipliers = solution.multipliers
         self._pull = max(float(np.abs(stack.g).max()), 1e-12)
@@ -74,9 +75,8 @@ class HeldBack:
 
     def _bound(self, column: int, up: bool, multiplier: float) -> Active:
         lower, upper = self._stack.box_names()[column]
-        reach = self._stack.reach(column)
-        bound = self._upper[column] if up else -self._lower[column]
-        kind = "speed" if bound >= reach * (1 - 1e-9) else "position"
+        bound = self._upper[column] if up else self._lower[column]
+        kind = self._stack.box.kind(column, float(bound), self._history)
         return Active(upper if up else lower, kind, float(multiplier) / self._pull)
 
     def _touched(self) -> list[Active]:

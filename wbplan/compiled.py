@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.acceleration import acceleration_bounds, braking_bounds, jerk_bounds
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
@@ -100,6 +101,8 @@ class CompiledPhase:
         driven: joints whose motion is given.
         polygon: support polygon of the contacts, `None` where the phase has no such limit.
         contact_points: (C, 3) [m], world.
+        acceleration: (n,) bounds of the n actuated joints [rad/s^2, m/s^2]; braking: what of it they count on
+            for braking; jerk: (n,) [rad/s^3, m/s^3] or None.
     """
 
     robot: Robot
@@ -116,6 +119,9 @@ class CompiledPhase:
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
+    acceleration: Array
+    braking: Array
+    jerk: Array | None
 
     @property
     def margin(self) -> float | None:
@@ -151,6 +157,7 @@ def compile_phase(
     free = np.array([*range(6), *(6 + j for j in range(model.nv - 6) if j not in given)], dtype=np.intp)
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
     frames = _frame_targets(phase, model, state)
+    acceleration = acceleration_bounds(robot, phase, q, model)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
     polygon = None
     if phase.support is not None:
@@ -190,6 +197,9 @@ def compile_phase(
         points,
         held,
         {**now, **phase.roles},
+        acceleration,
+        braking_bounds(robot, phase, acceleration),
+        jerk_bounds(robot, phase),
     )
 
 

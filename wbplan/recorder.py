@@ -116,6 +116,7 @@ class Recorder:
                     }
                     for h in loop.compiled.held
                 ],
+                "joint_acceleration": [float(a) for a in loop.compiled.acceleration],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
             }
@@ -156,6 +157,7 @@ class Recorder:
             "dt": self._dt,
             "parameters": parameters,
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
+            "joint_acceleration": np.max([p["joint_acceleration"] for p in self._phases], axis=0).tolist(),
             "phases": self._phases,
             "report": report,
         }

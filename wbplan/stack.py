@@ -3,7 +3,7 @@
     minimise    1/2 |weight (J dq - rhs)|^2 over soft rows  +  1/2 dq' D dq  -  h' dq
     subject to  A dq = b              contacts, hard tasks
                 C dq <= d             support polygon
-                lower <= dq <= upper  joint positions and speeds
+                lower <= dq <= upper  joint positions, speeds and accelerations (see `joint_box`)
 
 D and h hold what is diagonal: posture, damping, and a curvature damping. A Gauss-Newton step neglects the
 curvature of a task's error; near a stretched limb the true Hessian then exceeds J'J by up to
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from wbplan import kernels
 from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
+from wbplan.joint_box import JointBox
 from wbplan.kinematics import Kinematics
 from wbplan.paths import number
 from wbplan.posture import Posture
@@ -36,8 +37,9 @@ REGULARISATION = 1e-6
 #: The tick stays this far [m] inside the promised margin: its row is linear, the CoM's path is not.
 MARGIN_RESERVE = 1e-4
 
-#: Stands for no bound in the QP.
-UNBOUNDED = 1e20
+
+#: A CoM that comes from outside its margin is on its way back at full recovery speed after this time [s].
+RECOVERY = 0.1
 
 
 def reach(model: Any, frame: int) -> float:
@@ -64,8 +66,12 @@ class Stack:
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
         damping: what stands on the whole diagonal of H, at the last `assemble`.
+        box: the joints' box, whose arrays lower and upper are.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
+        easing: 0 if all joints are to be able to stop together, 1 if each by itself, 2 if so with nearly all
+            of its acceleration: where hard tasks lead on, they cannot stop together.
+        com_step: (3,) how far the CoM went in the last tick [m].
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
 
@@ -78,10 +84,11 @@ class Stack:
         self.driven_step = np.zeros(len(self.driven))
         self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
         self.driving = bool(self._moving_driven)
-        self.drift, self.margin, self.damping = 0.0, np.inf, 0.0
+        self.drift, self.margin, self.damping, self.easing = 0.0, np.inf, 0.0, 0
         self._hard_rows()
         self._soft_rows()
-        self._joint_box()
+        self.box = JointBox(phase, dt)
+        self.lower, self.upper, self.q_index = self.box.lower, self.box.upper, self.box.q_index
         self._polygon()
 
     def _hard_rows(self) -> None:
@@ -154,25 +161,12 @@ class Stack:
                 levers.append(1.0)
         return np.array(levers)
 
-    def _joint_box(self) -> None:
-        """Bounds of the free joints; the base (first six columns) has none."""
-        model, limits, nf = self.phase.model, self.phase.phase.joint_limits, len(self.free)
-        self.q_index = self.free[6:] + 1
-        self._q_lower, self._q_upper = np.full(nf - 6, -np.inf), np.full(nf - 6, np.inf)
-        self._reach = np.full(nf - 6, np.inf)
-        self.lower, self.upper = np.full(nf, -UNBOUNDED), np.full(nf, UNBOUNDED)
-        if limits is not None:
-            self._q_lower = np.array(model.lowerPositionLimit)[self.q_index]
-            self._q_upper = np.array(model.upperPositionLimit)[self.q_index]
-            self._reach = limits.speed * np.array(model.velocityLimit)[self.free[6:]] * self.dt
-        else:
-            self._reach[:], self._q_lower[:], self._q_upper[:] = UNBOUNDED, -UNBOUNDED, UNBOUNDED
-
     def _polygon(self) -> None:
         polygon = self.phase.polygon
         self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
         self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
         self.C, self.d = np.zeros((len(self._offsets), len(self.free))), np.zeros(len(self._offsets))
+        self._closer, self.com_step = np.zeros(len(self._offsets)), np.zeros(3)
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -191,6 +185,7 @@ class Stack:
 
     def advance(self, t: float) -> None:
         """Move all targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
+        self.easing = 0
         self.rows.advance(t, self.dt)
         t += self.dt
         for posture in self.postures:
@@ -231,27 +226,58 @@ class Stack:
             self.H, self.g,
         )  # fmt: skip
         self.fill_box()
-        support = self.phase.phase.support
-        if support is not None:
-            self._fill_polygon(support.margin, -support.recovery_speed * self.dt)
+        self._fill_polygon(self._closer)
 
-    def _fill_polygon(self, margin: float, least: float) -> None:
-        kin = self.kinematics
-        kernels.polygon(
-            self._normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
-            margin + MARGIN_RESERVE, least, self.C, self.d,
-        )  # fmt: skip
+    def _fill_polygon(self, most: Array) -> None:
+        if len(most):
+            kernels.polygon(
+                self._normals, self.kinematics.com_jacobian, self.free, self.driven, self.driven_step, most,
+                self.C, self.d,
+            )  # fmt: skip
 
     def distances(self) -> Array:
         """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
         gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
         return gaps
 
+    def nearest(self) -> float:
+        """How near to any edge of the support polygon the CoM may come in this tick [m]."""
+        return float((self.distances() - self._closer).min(initial=np.inf))
+
     def fill_box(self) -> None:
-        """Fill lower and upper for the current configuration."""
-        kernels.box(
-            self.kinematics.q, self.q_index, self._q_lower, self._q_upper, self._reach, self.lower, self.upper
+        """Fill lower and upper, and how much nearer the CoM may come to each edge, for this configuration."""
+        support, box = self.phase.phase.support, self.box
+        if support is None:
+            box.fill(self.kinematics.q, self._closer, self._closer, self.easing)
+            return
+        inside = self.distances() - (support.margin + MARGIN_RESERVE)
+        closing = self._normals @ self.com_step[:2]
+        box.fill(self.kinematics.q, inside, closing, self.easing)
+        back = support.recovery_speed * self.dt
+        kernels.approach(
+            inside, closing, box.ticks, box.factor, back, back * self.dt / RECOVERY, self.easing, self._closer
         )
+
+    def ease(self) -> bool:
+        """Care less for stopping in this tick, where it found no step; False if that has been tried."""
+        if self.easing == 2 or self.phase.phase.joint_limits is None:
+            return False
+        self.easing += 1
+        self.fill_box()
+        self._fill_polygon(self._closer)
+        return True
+
+    def begin(self, velocity: Array) -> None:
+        """Start at a velocity (nv,) [m/s, rad/s]."""
+        step = velocity * self.dt
+        self.kinematics.differentiate()
+        self.took(step, self.kinematics.com_jacobian @ step)
+        self.box.older[:] = self.box.previous
+
+    def took(self, step: Array, com_step: Array) -> None:
+        """The robot went on by a tangent step (nv,), its CoM by (3,) [m]."""
+        self.com_step[:] = com_step
+        self.box.took(step[self.free[6:]])
 
     def soft_damping(self) -> float:
         """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
@@ -272,12 +298,9 @@ class Stack:
         self.b[:] = self.hard_error
         support = self.phase.phase.support
         if support is not None:
-            self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
+            inside = self.distances() - (support.margin + MARGIN_RESERVE)
+            self._fill_polygon(np.maximum(inside, 0.0) if recovering else inside)
         self.driven_step[:] = given
-
-    def reach(self, column: int) -> float:
-        """How far [m or rad] the speed limit lets a free column move in one tick."""
-        return float(self._reach[column - 6])
 
     # -- names -------------------------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ from wbplan.backends import make_backend
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
-from wbplan.paths import number
+from wbplan.paths import number, vector
 from wbplan.retract import DRIFT, Retraction
 from wbplan.robot import Robot
 from wbplan.script import Phase
@@ -99,9 +99,15 @@ class Loop:
         backend: 'proxqp' or 'placo'.
         placed: pose in the world of bodies that stand somewhere, by name.
         roles: the role that each limb is in, where `q` leaves it open.
+        velocity: (nv,) at which it starts, as `Loop.velocity` of a loop before [m/s, rad/s]; at rest.
+        rest_at: time [s] of the phase by which all joints are to be at rest; by default never.
+        braking: (n,) accelerations [rad/s^2, m/s^2] that phases after this one leave for braking.
+
+    Attributes:
+        velocity: (nv,) of the last step [m/s, rad/s].
 
     Raises:
-        SpecError: the phase does not fit the robot.
+        SpecError: the phase does not fit the robot, or not how it moves when the phase begins.
     """
 
     def __init__(
@@ -114,6 +120,9 @@ class Loop:
         backend: str = "proxqp",
         placed: Mapping[str, Any] | None = None,
         roles: Mapping[str, str | None] | None = None,
+        velocity: Array | None = None,
+        rest_at: float | None = None,
+        braking: Array | None = None,
     ) -> None:
         self.dt, self.t = number(dt, "dt", "a finite positive time in seconds", above=0.0), 0.0
         if isinstance(state, State) and list(state.model.names) != list(robot.model.names):
@@ -126,6 +135,17 @@ class Loop:
         self.stack.measure(self.q)
         self._backend = make_backend(backend, self.stack)
         self._retraction = Retraction(self.stack)
+        self._begin(velocity, rest_at, braking)
+
+    def _begin(self, velocity: Array | None, rest_at: float | None, braking: Array | None) -> None:
+        """How it moves when the phase begins, and when it is to be at rest."""
+        nv = self.compiled.model.nv
+        self.velocity = vector(np.zeros(nv) if velocity is None else velocity, nv, "Loop: velocity")
+        self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
+        joints = self.compiled.free[6:]
+        self.stack.begin(self.velocity)
+        if braking is not None:
+            self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
 
     @property
     def margin(self) -> float:
@@ -170,8 +190,10 @@ class Loop:
         elif stack.live:
             stack.aim(self.t)
             stack.measure(q)
-        before = stack.margin
+        before, com = stack.margin, stack.kinematics.com.copy()
         ends = self.t + self.dt
+        if self._rest_at is not None:
+            stack.box.left = max(1.0, round((self._rest_at - self.t) / self.dt))
         try:
             stack.advance(self.t)
             solution = self._backend.solve()
@@ -181,8 +203,11 @@ class Loop:
             stack.measure(q)
             raise
         self.q, self.t = new, ends
-        v = pin.difference(self.compiled.model, q, new) / self.dt
-        return Tick(self, v, HeldBack(stack, solution), started)
+        taken = pin.difference(self.compiled.model, q, new)
+        held_back = HeldBack(stack, solution)
+        self.velocity = taken / self.dt
+        stack.took(taken, stack.kinematics.com - com)
+        return Tick(self, self.velocity, held_back, started)
 
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""

@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
+from wbplan.joint_box import UNBOUNDED
 from wbplan.qp import Multipliers, Solution
-from wbplan.stack import UNBOUNDED, Stack
+from wbplan.stack import Stack
 
 Array = NDArray[np.float64]
+
+#: How sure ProxQP has to be that a problem has no solution.
+INFEASIBLE = 1e-20
 
 
 @final
@@ -42,6 +46,8 @@ class ProxqpBackend:
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
         qp.settings.max_iter = 200
         qp.settings.check_duality_gap = False
+        # Steps and their bounds are small numbers: by the usual 1e-4, feasible problems pass for infeasible.
+        qp.settings.eps_primal_inf = INFEASIBLE
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
         qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         return qp
@@ -59,7 +65,7 @@ class ProxqpBackend:
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
-        if not (self._run() or self._retry() or (self._wait_for_margin() and self._retry())):
+        if not (self._run() or self._retry() or self._eased() or (self._wait_for_margin() and self._retry())):
             raise solve_error(s, "the QP has no solution")
         results, edges = self._qp.results, len(s.d)
         found = Multipliers(np.array(results.y), np.array(results.z[:edges]), np.array(results.z[edges:]))
@@ -82,6 +88,13 @@ class ProxqpBackend:
         outside = bool((self._stack.d < 0.0).any())
         np.maximum(self._stack.d, 0.0, out=self._stack.d)
         return outside
+
+    def _eased(self) -> bool:
+        """With less care for stopping, where hard tasks lead on."""
+        while self._stack.ease():
+            if self._retry():
+                return True
+        return False
 
     def _retry(self) -> bool:
         """Once more from nothing, with patience: a warm start may be a bad one."""
