@@ -1,13 +1,15 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
+from wbplan import gaits
 from wbplan.active import Active
 from wbplan.bodies import Body, Carried
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.contacts import Contact
+from wbplan.contacts import Contact, Push
 from wbplan.errors import (
     BundleError,
     CheckFailed,
+    GaitError,
     ModelError,
     Relaxation,
     SolveError,
@@ -15,7 +17,9 @@ from wbplan.errors import (
     ViewError,
     WbplanError,
 )
-from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.objectives import BalanceTask, ManipulabilityTask
+from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
@@ -37,7 +41,9 @@ from wbplan.version import VERSION as __version__
 __all__ = [
     "AS_IS",
     "Active",
+    "BalanceTask",
     "Body",
+    "Box",
     "Bundle",
     "BundleError",
     "Carried",
@@ -46,14 +52,22 @@ __all__ = [
     "ComTask",
     "Contact",
     "Curve",
+    "Cylinder",
     "DampingTask",
+    "GaitError",
+    "Ground",
+    "HeightField",
     "Hold",
     "JointLimits",
     "Line",
     "Live",
     "Loop",
+    "ManipulabilityTask",
+    "Mesh",
     "MinJerk",
     "ModelError",
+    "Obstacle",
+    "Obstacles",
     "OrientationTask",
     "Path",
     "Phase",
@@ -61,16 +75,20 @@ __all__ = [
     "PoseTask",
     "PositionTask",
     "PostureTask",
+    "Push",
     "RelativePoseTask",
     "Relaxation",
     "Robot",
     "Script",
+    "SelfCollision",
     "SolveError",
     "SpecError",
+    "Sphere",
     "State",
     "SupportPolygon",
     "Swing",
     "Task",
+    "Terrain",
     "Tick",
     "Trajectory",
     "ViewError",
@@ -78,6 +96,7 @@ __all__ = [
     "WbplanError",
     "__version__",
     "check",
+    "gaits",
     "load_robot",
     "plan",
 ]

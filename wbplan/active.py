@@ -24,7 +24,7 @@ class Active:
 
     Attributes:
         name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
-        kind: 'position', 'speed', 'acceleration', 'jerk', 'margin' or 'hard'.
+        kind: 'position', 'speed', 'acceleration', 'jerk', 'hard', or that of its `RowBlock`, as 'margin'.
         multiplier: Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver has none.
     """
 
@@ -45,7 +45,17 @@ class HeldBack:
         solution: the step, just taken.
     """
 
-    __slots__ = ("_distances", "_history", "_lower", "_multipliers", "_pull", "_stack", "_step", "_upper")
+    __slots__ = (
+        "_distances",
+        "_history",
+        "_lower",
+        "_multipliers",
+        "_pull",
+        "_row_names",
+        "_stack",
+        "_step",
+        "_upper",
+    )
 
     def __init__(self, stack: Stack, solution: Solution) -> None:
         self._stack, self._step = stack, solution.step
@@ -54,6 +64,7 @@ class HeldBack:
         self._multipliers = solution.multipliers
         self._pull = max(float(np.abs(stack.g).max()), 1e-12)
         self._distances = stack.distances()
+        self._row_names = stack.keep_row_names()
 
     def named(self) -> tuple[Active, ...]:
         """Limits and hard rows, the strongest first."""
@@ -66,8 +77,11 @@ class HeldBack:
             self._bound(int(k), m.box[k] > 0, abs(m.box[k]))
             for k in np.flatnonzero(np.abs(m.box) > FAINT * pull)
         ]
-        for k in np.flatnonzero(np.abs(m.edges) > FAINT * pull):
-            found.append(Active(stack.edge_names()[k], "margin", float(abs(m.edges[k]) / pull)))
+        strong = np.flatnonzero(np.abs(m.rows) > FAINT * pull)
+        names = self._row_names() if len(strong) else []
+        for k in strong:
+            name, kind, _ = names[k]
+            found.append(Active(name, kind, float(abs(m.rows[k]) / pull)))
         hard: dict[str, float] = {}
         for (label, _), y in zip(stack.hard_names(), m.hard, strict=True):
             hard[label] = max(hard.get(label, 0.0), abs(float(y)) / pull)

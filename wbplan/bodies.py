@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
 
@@ -76,16 +76,24 @@ class Carried:
         by: the frame that holds it.
         pose: `pin.SE3`, the body in that frame; `AS_IS`: as the two stand when the phase begins. A body
             that stands nowhere yet (no `Body.pose`, not carried before) is then put at the frame itself.
+        pads: frames that press on it, as a gripper's fingers do, by whose friction a simulation holds it;
+            where not given, the holder and whatever forms a closed loop with it.
     """
 
     body: Body
     by: str
     pose: Any = field(default=AS_IS, compare=False)
+    pads: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):
             raise SpecError(f"Carried.body: expected a wb.Body, got {self.body!r}")
         name_of(self.by, f"Carried '{self.body.name}'.by")
+        given: Any = self.pads
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise SpecError(f"Carried '{self.body.name}'.pads: expected a list of frames, got {given!r}")
+        pads = tuple(name_of(pad, f"Carried '{self.body.name}'.pads") for pad in given)
+        object.__setattr__(self, "pads", pads)
         if not isinstance(self.pose, AsIs):
             object.__setattr__(self, "pose", _pose(self.pose, f"Carried '{self.body.name}'.pose"))
 
@@ -93,12 +101,13 @@ class Carried:
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A carried body: its pose in the holding frame, and its own frame's number in the phase's model."""
+    """A carried body: its pose in the holding frame, its frame's number in the phase's model, its pads."""
 
     body: Body
     holder: str
     T_holder_body: Any
     frame: int
+    pads: tuple[str, ...] = ()
 
 
 def frame_number(model: pin.Model, name: str, what: str) -> int:
@@ -148,6 +157,8 @@ def with_carried(
     for item in carried:
         body = item.body
         by = frame_number(robot.model, item.by, f"{what}: body '{body.name}'.by")
+        for pad in item.pads:
+            frame_number(robot.model, pad, f"{what}: body '{body.name}'.pads")
         holder = model.frames[by]
         if model.existFrame(body.name):
             raise SpecError(f"{what}: body '{body.name}' has the name of a frame of {robot.name}")
@@ -162,6 +173,6 @@ def with_carried(
         inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()
         inertia.lever = np.array(body.com)
         frame = pin.Frame(body.name, holder.parentJoint, by, placement, pin.FrameType.BODY)
-        held.append(Held(body, item.by, pose, model.addFrame(frame)))
+        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads))
         model.appendBodyToJoint(holder.parentJoint, inertia, placement)
     return model, tuple(held)

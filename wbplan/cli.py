@@ -22,7 +22,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from wbplan import catalog
 from wbplan.bundle import Bundle, is_bundle
 from wbplan.checks import check as recompute
-from wbplan.errors import BundleError, CheckFailed, PlanFalls, SolveError, SpecError, WbplanError
+from wbplan.errors import BundleError, CheckFailed, GaitError, PlanFalls, SolveError, SpecError, WbplanError
 from wbplan.live import LiveView
 from wbplan.papers import DIFFERS, report, summary
 from wbplan.physics import ghost_of
@@ -80,6 +80,8 @@ def main(args: Sequence[str] | None = None) -> int:
         return _say(_in_one_line(error) + hint, BAD_INPUT)
     except SolveError as error:
         return _say(f"no plan exists: {error}", BROKEN)
+    except GaitError as error:
+        return _say(f"no walk exists: {error}", BROKEN)
     except (CheckFailed, PlanFalls) as error:
         return _say(str(error), BROKEN)
     except WbplanError as error:

@@ -13,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.acceleration import acceleration_bounds, braking_bounds, jerk_bounds
+from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.bodies import Held, frame_number, with_carried
 from wbplan.errors import SpecError
-from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.geometry import HalfPlanes
+from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
 from wbplan.script import Phase, unknown
 from wbplan.state import State, find_frame
+from wbplan.statics import support
 from wbplan.tasks import ComTask, DampingTask, PostureTask, check_kind
 
 Array = NDArray[np.float64]
@@ -38,6 +41,7 @@ class FrameTarget:
         position_weight, rotation_weight: (3,); a zero leaves the row out.
         gain: [1/s].
         hard: rows are equalities, weights then count only as zero or not.
+        level: of a soft one, from 0, the highest.
     """
 
     label: str
@@ -48,18 +52,7 @@ class FrameTarget:
     rotation_weight: Array
     gain: float
     hard: bool
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class ComTarget:
-    """A CoM task with its target bound."""
-
-    label: str
-    path: Path
-    weight: Array
-    gain: float
-    hard: bool
+    level: int = 0
 
 
 @final
@@ -77,6 +70,7 @@ class JointTarget:
     weight: Array
     gain: float
     hard: bool
+    level: int = 0
 
 
 @final
@@ -99,7 +93,11 @@ class CompiledPhase:
         frame_targets: contacts first, then hard tasks, then soft ones.
         free: columns (nf,) of the velocity that the QP decides: the base and the free joints.
         driven: joints whose motion is given.
-        polygon: support polygon of the contacts, `None` where the phase has no such limit.
+        polygon: where the CoM may be, the hull of the contacts or their region; `None` where the phase has no
+            such limit.
+        region: whether `polygon` is the static-equilibrium region: the hull is not, unless the contacts lie
+            in one plane and nothing pushes.
+        ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
         acceleration: (n,) bounds of the n actuated joints [rad/s^2, m/s^2]; braking: what of it they count on
             for braking; jerk: (n,) [rad/s^3, m/s^3] or None.
@@ -116,12 +114,14 @@ class CompiledPhase:
     free: NDArray[np.intp]
     driven: tuple[Driven, ...]
     polygon: HalfPlanes | None
+    region: bool
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
     acceleration: Array
     braking: Array
     jerk: Array | None
+    ascents: tuple[AscentTarget, ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -156,17 +156,12 @@ def compile_phase(
     given = {d.joint for d in driven}
     free = np.array([*range(6), *(6 + j for j in range(model.nv - 6) if j not in given)], dtype=np.intp)
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
-    frames = _frame_targets(phase, model, state)
+    level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
+    frames = _frame_targets(phase, model, state, level)
     acceleration = acceleration_bounds(robot, phase, q, model)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
-    polygon = None
-    if phase.support is not None:
-        try:
-            polygon = support_polygon(points[:, :2])
-        except SpecError as error:
-            names = ", ".join(c.frame for c in phase.contacts) or "none"
-            raise SpecError(f"{at}: its contacts ({names}) span no support polygon: {error}") from None
-    tasks = (*phase.hard, *phase.soft)
+    balance = [t for t in phase.soft_tasks if isinstance(t, BalanceTask)]
+    polygon, region = support(phase, model, state, points, wanted=bool(balance))
     coms = tuple(
         ComTarget(
             t.label,
@@ -174,14 +169,19 @@ def compile_phase(
             t.position_weight,
             t.gain,
             t in phase.hard,
+            level.get(id(t), 0),
         )
-        for t in tasks
+        for t in phase.tasks
         if isinstance(t, ComTask)
     )
+    if polygon is not None:
+        coms += tuple(balance_target(t, polygon, state.com, np.zeros(3), level[id(t)]) for t in balance)
     joints = tuple(
-        _joint_target(robot, t, q, given, t in phase.hard, at) for t in tasks if isinstance(t, PostureTask)
+        _joint_target(robot, t, q, given, t in phase.hard, level.get(id(t), 0), at)
+        for t in phase.tasks
+        if isinstance(t, PostureTask)
     )
-    damping = float(sum(t.weight**2 for t in phase.soft if isinstance(t, DampingTask)))
+    damping = float(sum(t.weight**2 for t in phase.soft_tasks if isinstance(t, DampingTask)))
     return CompiledPhase(
         robot,
         phase,
@@ -193,13 +193,15 @@ def compile_phase(
         damping,
         free,
         driven,
-        polygon,
+        None if phase.support is None else polygon,
+        region,
         points,
         held,
         {**now, **phase.roles},
         acceleration,
         braking_bounds(robot, phase, acceleration),
         jerk_bounds(robot, phase),
+        tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
     )
 
 
@@ -320,7 +322,9 @@ def _check_feet(
                 raise SpecError(f"{at}: contact '{foot}' while {limb} changes its role ({joints} move)")
 
 
-def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget, ...]:
+def _frame_targets(
+    phase: Phase, model: Any, state: State, level: Mapping[int, int]
+) -> tuple[FrameTarget, ...]:
     """Contacts, then hard tasks, then soft ones."""
     targets = [
         FrameTarget(
@@ -354,13 +358,14 @@ def _frame_targets(phase: Phase, model: Any, state: State) -> tuple[FrameTarget,
                 task.rotation_weight,
                 task.gain,
                 task in phase.hard,
+                level.get(id(task), 0),
             )
         )
     return tuple(targets)
 
 
 def _joint_target(
-    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, at: str
+    robot: Robot, task: PostureTask, q: Array, given: set[int], hard: bool, level: int, at: str
 ) -> JointTarget:
     """Target and weight of every joint that the task asks for and the phase leaves free."""
     what = f"{at}, {task.label}"
@@ -388,4 +393,4 @@ def _joint_target(
         weight[j] = weights.get(name, 0.0)
         path = values.get(name, Hold(goal[j]))
         paths.append((j, _bound(path, np.asarray(q[7 + j]), f"{what}.target['{name}']", (NUMBER,))))
-    return JointTarget(task.label, tuple(paths), weight, task.gain, hard)
+    return JointTarget(task.label, tuple(paths), weight, task.gain, hard, level)

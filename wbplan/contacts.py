@@ -37,3 +37,27 @@ class Contact:
         unit = normal / np.linalg.norm(normal)
         object.__setattr__(self, "friction", friction)
         object.__setattr__(self, "normal", tuple(float(x) for x in unit))
+
+
+@final
+@dataclass(frozen=True)
+class Push:
+    """The robot pushes with a frame; what it pushes on pushes back, and the stance has to hold that too.
+
+    The support region of the phase holds with the push and without it, should what is pushed on give way.
+    The frame stays where it is: the phase has a hard task that holds it, or it is a contact's.
+
+    Args:
+        frame: whose origin pushes.
+        force: [N], world, of the robot on what it touches.
+    """
+
+    frame: str
+    force: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        at = f"Push '{name_of(self.frame, 'Push.frame')}'"
+        force = checked(self.force, f"{at}.force")
+        if kind_of(force) != POINT:
+            raise SpecError(f"{at}.force: expected three numbers [N], got {self.force}")
+        object.__setattr__(self, "force", tuple(float(x) for x in force))

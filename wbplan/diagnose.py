@@ -1,6 +1,6 @@
 """Which hard rows contradict each other, and by how much: asked only after a tick found no step.
 
-Every hard row and polygon edge may give way by a slack s; the least sum of squares of these is found with
+Every hard row and inequality row may give way by a slack s; the least sum of squares of these is found with
 the joints' box kept. A row that does not take part in the contradiction needs no slack.
 """
 
@@ -20,7 +20,7 @@ NOISE = 1e-3
 
 
 def least_relaxation(stack: Stack) -> tuple[Array, Array, Array]:
-    """Slacks of the hard rows (m,), of the polygon's edges (E,), and multipliers of the box (nf,).
+    """Slacks of the hard rows (m,), of the inequality rows (p,), and multipliers of the box (nf,).
 
     minimise 1/2 |s|^2 + eps/2 |x|^2  subject to  A x + s = b,  C x - s' <= d,  lower <= x <= upper.
     """
@@ -44,12 +44,12 @@ def least_relaxation(stack: Stack) -> tuple[Array, Array, Array]:
 
 def solve_error(stack: Stack, what: str) -> SolveError:
     """The error that names the clashing tasks, their least relaxations and the limits against them."""
-    hard, edges, box = least_relaxation(stack)
+    hard, rows, box = least_relaxation(stack)
     groups: dict[tuple[str, str], float] = {}
     for (label, unit), slack in zip(stack.hard_names(), hard, strict=True):
         groups[label, unit] = float(np.hypot(groups.get((label, unit), 0.0), slack))
-    for label, slack in zip(stack.edge_names(), edges, strict=True):
-        groups[label, "m"] = float(slack)
+    for (label, _, unit), slack in zip(stack.row_names(), rows, strict=True):
+        groups[label, unit] = float(slack)
     largest = max(groups.values(), default=0.0)
     clashes = [
         Relaxation(label, amount, unit)

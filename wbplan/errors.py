@@ -62,6 +62,27 @@ class SolveError(WbplanError):
         super().__init__(message)
 
 
+class GaitError(WbplanError):
+    """A gait, stance, path and terrain that no motion of the body goes with.
+
+    Attributes:
+        step: number of the step at fault, from 0; `None` where it is not one step.
+        margin: the largest stability margin [m] there is in that step, where it was computed.
+        stride: the longest stride [m] that would hold, where there is one.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        step: int | None = None,
+        margin: float | None = None,
+        stride: float | None = None,
+    ) -> None:
+        self.step, self.margin, self.stride = step, margin, stride
+        super().__init__(message)
+
+
 class CheckFailed(WbplanError):
     """A plan breaks a promise.
 

@@ -76,16 +76,37 @@ class HalfPlanes:
         flat = FLAT * _extent(self.vertices)
         return _without_flat_corners(left, list(range(len(left))), flat)[0]
 
+    def common(self, other: HalfPlanes) -> Array:
+        """Corners (W, 2) [m], counter-clockwise, of what two polygons share; (0, 2) if nothing."""
+        left = self.vertices
+        for normal, offset in zip(other.normals, other.offsets, strict=True):
+            left = _clip(left, normal, offset)
+        return left
+
     def chebyshev(self) -> tuple[Array, float]:
         """Centre (2,) [m] and radius [m] of the largest circle inside.
 
-        `max r` over (c, r) with `normals @ c + r <= offsets`: the point of the largest margin.
+        `max r` over (c, r) with `normals @ c + r <= offsets`: the point of the largest margin. Between
+        parallel edges a whole segment of points has it: then its middle.
         """
         rows = np.column_stack([self.normals, np.ones(len(self.offsets))])
         found = linprog(
             [0.0, 0.0, -1.0], A_ub=rows, b_ub=self.offsets, bounds=[(None, None)] * 2 + [(0, None)]
         )
-        return np.array(found.x[:2]), float(found.x[2])
+        radius = float(found.x[2])
+        within = self.offsets - radius + FLAT * _extent(self.vertices)
+        ends = np.array(
+            [
+                [
+                    linprog(sign * axis, A_ub=self.normals, b_ub=within, bounds=(None, None)).x
+                    for sign in (1.0, -1.0)
+                ]
+                for axis in np.eye(2)
+            ]
+        )  # (axis, end, 2): where the segment is lowest and highest along x, and along y
+        along = int(np.argmax([np.linalg.norm(high - low) for low, high in ends]))
+        middle: Array = ends[along].mean(axis=0)
+        return middle, radius
 
 
 def support_polygon(points_xy: ArrayLike) -> HalfPlanes:

@@ -13,10 +13,10 @@ whoever keeps the bounds above, on the CoM's way to an edge of the support polyg
 
 M is free to choose, the larger the faster joints may be, and the earlier they slow down before a limit. It is
 the largest for which slowing down as much as the acceleration allows, all x = (1 - min(1, 2 / M_p)) p with
-M_p = max |p| / B, keeps the bounds again, but may always be M_p + GROWTH. A state that is within the bounds for
-that slower motion only keeps to it, as long as each joint by itself can still stop in time,
+M_p = max |p| / B, keeps the bounds again, but may always be M_p + GROWTH. A state that is within the bounds
+for that slower motion only keeps to it, as long as each joint by itself can still stop in time,
 
-    x <= brake(upper - q),    brake(d) = B (d / B / (n + 1) + n / 2),    n = floor((sqrt(1 + 8 d / B) - 1) / 2)
+    x <= brake(upper - q),   brake(d) = B (d / B / (n + 1) + n / 2),   n = floor((sqrt(1 + 8 d / B) - 1) / 2)
 
 the longest step for which x, x - B, x - 2B, ... add up to d at most. So the box is never empty, and what it
 allows never leaves the limits. A state outside of them comes back along the same curve.
@@ -54,6 +54,9 @@ BRAKING = 0.45
 
 #: By how much M may always grow in a tick: joints that take over from one that stops have to speed up.
 GROWTH = 1.0
+
+#: A CoM that comes from outside its margin is on its way back at full recovery speed after this time [s].
+RECOVERY = 0.1
 
 #: Stands for no bound in the QP.
 UNBOUNDED = 1e20

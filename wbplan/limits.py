@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, final
 
 from wbplan.errors import SpecError
+from wbplan.obstacles import Obstacle, Terrain
 from wbplan.paths import name_of, number
 
 #: One bound for every joint, or a joint's name -> its bound.
@@ -73,6 +75,8 @@ class SupportPolygon:
     """The CoM of robot and carried bodies stays `margin` [m] inside the hull of the phase's contacts.
 
     N (c + J dq) <= d - margin, with N the unit normals of the edges, in the horizontal plane.
+    Where the contacts do not lie in one plane that is their ground, or the phase pushes on something, the
+    static-equilibrium region (see `wbplan.statics`) stands for the hull.
     A CoM that starts outside moves inward at `recovery_speed`, and never outward, until it is inside.
 
     Args:
@@ -90,3 +94,94 @@ class SupportPolygon:
         )
         object.__setattr__(self, "margin", margin)
         object.__setattr__(self, "recovery_speed", speed)
+
+
+def _reaches(limit: SelfCollision | Obstacles) -> None:
+    """Checks and keeps `distance` and `influence`."""
+    at = type(limit).__name__
+    distance = number(limit.distance, f"{at}.distance", "metres of 0 or more", least=0.0)
+    influence = number(limit.influence, f"{at}.influence", "metres")
+    if not influence > distance:
+        raise SpecError(f"{at}.influence: expected more than the distance {distance} m, got {influence}")
+    object.__setattr__(limit, "distance", distance)
+    object.__setattr__(limit, "influence", influence)
+
+
+@final
+@dataclass(frozen=True)
+class SelfCollision:
+    """Links, and the bodies that they carry, stay `distance` [m] from each other.
+
+    n^T (J_b - J_a) dq >= -gain (d - distance) for each pair nearer than `influence`, with d its distance, n
+    the unit normal from a to b and J the Jacobians of the nearest points. Pairs that the SRDF leaves out,
+    neighbours in the chain, and a body with what holds it are not looked at. Nearer than `distance` at
+    first, a pair moves outward and never inward.
+
+    Args:
+        distance: [m].
+        influence: [m], pairs further apart than this have no row.
+    """
+
+    distance: float = 0.005
+    influence: float = 0.05
+
+    def __post_init__(self) -> None:
+        _reaches(self)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Links, and the bodies that they carry, stay `distance` [m] from what stands in the world.
+
+    Rows as those of `SelfCollision`. What stands in the world is `shapes`, and every body of the script that
+    is not carried. Feet, and what `except_for` names, may touch; they may not go in.
+
+    Args:
+        shapes: the obstacles; the ground is one of them. They are also the phase's terrain.
+        distance: [m].
+        influence: [m], pairs further apart than this have no row.
+        except_for: frames (of links, or bodies) that may touch any obstacle, or pairs (frame, obstacle).
+
+    Raises:
+        SpecError: a field is not what it has to be, or two obstacles have one name.
+    """
+
+    shapes: tuple[Obstacle, ...] = ()
+    distance: float = 0.005
+    influence: float = 0.05
+    except_for: tuple[str | tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        _reaches(self)
+        shapes = _listed(self.shapes, "Obstacles.shapes: expected a list of Obstacle")
+        for item in shapes:
+            if not isinstance(item, Obstacle):
+                raise SpecError(f"Obstacles.shapes: expected Obstacle, got {item!r}")
+        names = [item.name for item in shapes]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise SpecError(f"Obstacles.shapes: named more than once: {', '.join(twice)}")
+        excepted = _listed(self.except_for, "Obstacles.except_for: expected a list of frames")
+        object.__setattr__(self, "shapes", shapes)
+        object.__setattr__(self, "except_for", tuple(_exception(item) for item in excepted))
+
+    @cached_property
+    def terrain(self) -> Terrain:
+        """The obstacles seen from above."""
+        return Terrain(self.shapes)
+
+
+def _listed(given: object, what: str) -> tuple[Any, ...]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise SpecError(f"{what}, got {given!r}")
+    return tuple(given)
+
+
+def _exception(item: object) -> str | tuple[str, str]:
+    what = "Obstacles.except_for"
+    if isinstance(item, list | tuple):
+        if len(item) != 2:
+            raise SpecError(f"{what}: expected a frame or (frame, obstacle), got {item!r}")
+        return name_of(item[0], f"{what}: frame"), name_of(item[1], f"{what}: obstacle")
+    return name_of(item, what)

@@ -37,6 +37,7 @@ class LiveView:
             bodies=script.bodies,
             urdf_dir=robot.urdf_path.parent,
             trails=tuple(robot.hands.values()),
+            obstacles=script.obstacles,
         )
         self._bodies: dict[str, Array] = {
             body.name: pin.SE3ToXYZQUAT(body.pose) for body in script.bodies if body.pose is not None

@@ -18,12 +18,12 @@ class Multipliers:
 
     Attributes:
         hard: (m,) of the hard rows.
-        edges: (E,) of the support polygon's edges, 0 or more.
+        rows: (p,) of the inequality rows C dq <= d, 0 or more; `Stack.blocks` says what they are.
         box: (nf,) of the box, positive at an upper bound.
     """
 
     hard: Array
-    edges: Array
+    rows: Array
     box: Array
 
 

@@ -10,6 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
+from wbplan.compiled import CompiledPhase
+from wbplan.obstacles import to_record
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop, Tick
@@ -33,6 +35,7 @@ class Recorder:
         self._margin: list[float] = []
         self._phase: list[int] = []
         self._errors: list[dict[str, float]] = []
+        self._measures: list[dict[str, float]] = []
         self._worst: dict[str, float] = {}
         self._targets: list[dict[str, Array]] = []
         self._bodies: list[dict[str, Array]] = []
@@ -52,6 +55,7 @@ class Recorder:
             self._margin,
             self._phase,
             self._errors,
+            self._measures,
             self._targets,
             self._bodies,
         ):
@@ -76,6 +80,7 @@ class Recorder:
         self._phase.append(index)
         errors = stack.errors()
         self._errors.append(errors)
+        self._measures.append(stack.keep_measures()())
         for name, error in errors.items():
             self._worst[name] = max(error, self._worst.get(name, 0.0))
         self._targets.append(loop.targets())
@@ -87,14 +92,15 @@ class Recorder:
         first = self._phase.index(index)
         errors = self._errors[first:]
         tasks = []
-        for task in (*phase.hard, *phase.soft):
+        level = {task: k for k, tasks in enumerate(phase.levels) for task in tasks}
+        for task in phase.tasks:
             worst = {
                 part: max(
                     (e[f"{task.label}.{part}"] for e in errors if f"{task.label}.{part}" in e), default=None
                 )
                 for part in ("position", "orientation", "joints")
             }
-            tasks.append({"name": task.label, "hard": task in phase.hard, **worst})
+            tasks.append({"name": task.label, "hard": task in phase.hard, "level": level.get(task), **worst})
         self._phases.append(
             {
                 "name": phase.name,
@@ -113,10 +119,13 @@ class Recorder:
                         "pose": [float(x) for x in pin.SE3ToXYZQUAT(h.T_holder_body)],
                         "mass": h.body.mass,
                         "com": list(h.body.com),
+                        **({"pads": list(h.pads)} if h.pads else {}),
                     }
                     for h in loop.compiled.held
                 ],
                 "joint_acceleration": [float(a) for a in loop.compiled.acceleration],
+                **_region(loop.compiled),
+                "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
             }
@@ -137,6 +146,7 @@ class Recorder:
             bodies=_columns(self._bodies, 7),
             targets=_columns(self._targets, 7),
             errors={name: column[:, 0] for name, column in _columns(self._errors, 1).items()},
+            measures={name: column[:, 0] for name, column in _columns(self._measures, 1).items()},
         )
         microseconds = np.array(self._microseconds)
         report = {
@@ -158,10 +168,21 @@ class Recorder:
             "parameters": parameters,
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
             "joint_acceleration": np.max([p["joint_acceleration"] for p in self._phases], axis=0).tolist(),
+            "obstacles": [to_record(item) for item in self._script.obstacles],
             "phases": self._phases,
             "report": report,
         }
         return Bundle(plan, trajectory, self._robot.urdf_text)
+
+
+def _region(compiled: CompiledPhase) -> dict[str, Any]:
+    """What stands in plan.json only where it is: the region's corners, and forces on the surroundings."""
+    found: dict[str, Any] = {}
+    if compiled.region and compiled.polygon is not None:
+        found["region"] = compiled.polygon.vertices.tolist()
+    if compiled.phase.pushes:
+        found["pushes"] = [{"frame": p.frame, "force": list(p.force)} for p in compiled.phase.pushes]
+    return found
 
 
 def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:

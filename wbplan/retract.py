@@ -81,7 +81,7 @@ class Retraction:
         n, edges = len(stack.g), len(stack.d)
         qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
         qp.settings.eps_abs = 1e-9
-        qp.settings.primal_infeasibility_solving = True
+        qp.settings.primal_infeasibility_solving, qp.settings.max_iter = True, 1000
         unbounded = np.full(edges, -UNBOUNDED)
         qp.init(np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, unbounded, stack.d, lower, upper)
         qp.solve()

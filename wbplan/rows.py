@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wbplan import kernels
-from wbplan.compiled import WORLD, ComTarget, FrameTarget
+from wbplan.aims import ComTarget
+from wbplan.compiled import WORLD, FrameTarget
 from wbplan.kinematics import Kinematics
 from wbplan.paths import checked
 from wbplan.sampling import sample
@@ -37,6 +38,17 @@ def support_mask(model: Any, frame: int) -> Array:
         if joint > 0:
             mask[first : first + model.joints[joint].nv] = 1.0
     return mask
+
+
+def reach(model: Any, frame: int) -> float:
+    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
+    if frame == WORLD:
+        return 0.0
+    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
+    links = [model.jointPlacements[j].translation for j in joints] + [
+        model.frames[frame].placement.translation
+    ]
+    return float(sum(np.linalg.norm(link) for link in links))
 
 
 def _pairs(targets: Sequence[FrameTarget], slot: dict[int, int]) -> NDArray[np.intp]:

@@ -15,6 +15,7 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -22,35 +23,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan import kernels
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
-from wbplan.joint_box import JointBox
+from wbplan.ascent import Ascent
+from wbplan.compiled import CompiledPhase, FrameTarget
+from wbplan.joint_box import RECOVERY, JointBox
 from wbplan.kinematics import Kinematics
 from wbplan.paths import number
 from wbplan.posture import Posture
-from wbplan.rows import Rows
+from wbplan.rows import Rows, reach
 
 Array = NDArray[np.float64]
 
 #: Always on the diagonal [1/rad^2]: keeps the cost strictly convex where nothing is asked.
 REGULARISATION = 1e-6
 
+#: Drift of a hard row [m or rad] that may wait for a tick.
+SLIGHT = 2e-5
+
 #: The tick stays this far [m] inside the promised margin: its row is linear, the CoM's path is not.
 MARGIN_RESERVE = 1e-4
 
 
-#: A CoM that comes from outside its margin is on its way back at full recovery speed after this time [s].
-RECOVERY = 0.1
+@final
+@dataclass(frozen=True)
+class RowBlock:
+    """Inequality rows of one kind: consecutive rows of C.
 
+    Attributes:
+        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
+        span: where its rows stand.
+        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
+            gives one name a row, '' for a row that is not in use.
+    """
 
-def reach(model: Any, frame: int) -> float:
-    """Length [m] of the chain from the base to a frame: no joint of it has a longer lever arm."""
-    if frame == WORLD:
-        return 0.0
-    joints = [j for j in model.supports[model.frames[frame].parentJoint] if j > 1]
-    links = [model.jointPlacements[j].translation for j in joints] + [
-        model.frames[frame].placement.translation
-    ]
-    return float(sum(np.linalg.norm(link) for link in links))
+    kind: str
+    unit: str
+    span: slice
+    keep: Callable[[], Callable[[], list[str]]]
 
 
 @final
@@ -66,12 +74,13 @@ class Stack:
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
         damping: what stands on the whole diagonal of H, at the last `assemble`.
+        blocks: what the rows of C are.
         box: the joints' box, whose arrays lower and upper are.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
-        easing: 0 if all joints are to be able to stop together, 1 if each by itself, 2 if so with nearly all
-            of its acceleration: where hard tasks lead on, they cannot stop together.
-        com_step: (3,) how far the CoM went in the last tick [m].
+        easing: how much less careful this tick is than it should be, see `ease`.
+        com_step: (3,) how far the CoM went in the last tick; closer: (E,) how far it may go to each edge [m].
+        ascents: manipulability tasks.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
 
@@ -90,6 +99,7 @@ class Stack:
         self.box = JointBox(phase, dt)
         self.lower, self.upper, self.q_index = self.box.lower, self.box.upper, self.box.q_index
         self._polygon()
+        self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
 
     def _hard_rows(self) -> None:
         rows, nf = self.rows, len(self.free)
@@ -113,11 +123,8 @@ class Stack:
         rows, nf = self.rows, len(self.free)
         soft = slice(rows.hard, len(rows.error))
         count = len(rows.error) - rows.hard
-        self._weight, self._soft_error, self._soft_motion = (
-            rows.weight[soft],
-            rows.error[soft],
-            rows.motion[soft],
-        )
+        self._weight, self._soft_error = rows.weight[soft], rows.error[soft]
+        self._soft_motion = rows.motion[soft]
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
         self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
@@ -165,8 +172,12 @@ class Stack:
         polygon = self.phase.polygon
         self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
         self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
-        self.C, self.d = np.zeros((len(self._offsets), len(self.free))), np.zeros(len(self._offsets))
-        self._closer, self.com_step = np.zeros(len(self._offsets)), np.zeros(3)
+        edges = len(self._offsets)
+        self.C, self.d = np.zeros((edges, len(self.free))), np.zeros(edges)
+        self.blocks: list[RowBlock] = []
+        if edges:
+            self.blocks.append(RowBlock("margin", "m", slice(0, edges), lambda: self.edge_names))
+        self.closer, self.com_step = np.zeros(edges), np.zeros(3)
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -184,7 +195,7 @@ class Stack:
             posture.aim(t)
 
     def advance(self, t: float) -> None:
-        """Move all targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
+        """Move targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
         self.easing = 0
         self.rows.advance(t, self.dt)
         t += self.dt
@@ -225,11 +236,14 @@ class Stack:
             self._stiffness, self._posture_pull, self._posture_goal, self._posture_step, kin.q[self.q_index],
             self.H, self.g,
         )  # fmt: skip
+        for ascent in self.ascents:
+            ascent.update()
+            ascent.write(self.H, self.g)
         self.fill_box()
-        self._fill_polygon(self._closer)
+        self._fill_polygon(self.closer)
 
     def _fill_polygon(self, most: Array) -> None:
-        if len(most):
+        if self.phase.phase.support is not None:
             kernels.polygon(
                 self._normals, self.kinematics.com_jacobian, self.free, self.driven, self.driven_step, most,
                 self.C, self.d,
@@ -240,31 +254,33 @@ class Stack:
         gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
         return gaps
 
-    def nearest(self) -> float:
-        """How near to any edge of the support polygon the CoM may come in this tick [m]."""
-        return float((self.distances() - self._closer).min(initial=np.inf))
-
     def fill_box(self) -> None:
         """Fill lower and upper, and how much nearer the CoM may come to each edge, for this configuration."""
         support, box = self.phase.phase.support, self.box
         if support is None:
-            box.fill(self.kinematics.q, self._closer, self._closer, self.easing)
+            box.fill(self.kinematics.q, self.closer, self.closer, self.easing)
             return
         inside = self.distances() - (support.margin + MARGIN_RESERVE)
         closing = self._normals @ self.com_step[:2]
         box.fill(self.kinematics.q, inside, closing, self.easing)
         back = support.recovery_speed * self.dt
-        kernels.approach(
-            inside, closing, box.ticks, box.factor, back, back * self.dt / RECOVERY, self.easing, self._closer
-        )
+        more = back * self.dt / RECOVERY
+        kernels.approach(inside, closing, box.ticks, box.factor, back, more, self.easing, self.closer)
 
     def ease(self) -> bool:
-        """Care less for stopping in this tick, where it found no step; False if that has been tried."""
-        if self.easing == 2 or self.phase.phase.joint_limits is None:
+        """Be less careful in this tick, which found no step; False if that has been tried.
+
+        All joints are to be able to stop together (0), or each by itself (1), or with nearly all of its
+        acceleration (2): where hard tasks lead on, they cannot together. Drift waits (3).
+        """
+        most = 3 if self.drift <= SLIGHT else 2
+        if self.easing >= most or self.phase.phase.joint_limits is None:
             return False
         self.easing += 1
         self.fill_box()
-        self._fill_polygon(self._closer)
+        self._fill_polygon(self.closer)
+        if self.easing == 3:
+            self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard]
         return True
 
     def begin(self, velocity: Array) -> None:
@@ -275,7 +291,7 @@ class Stack:
         self.box.older[:] = self.box.previous
 
     def took(self, step: Array, com_step: Array) -> None:
-        """The robot went on by a tangent step (nv,), its CoM by (3,) [m]."""
+        """The robot went on by a step (nv,), its CoM by (3,) [m]."""
         self.com_step[:] = com_step
         self.box.took(step[self.free[6:]])
 
@@ -317,10 +333,28 @@ class Stack:
         }
         return names + [(label, "m" if j in sliding else "rad") for j, _, label in self.hard_joints]
 
+    def row_names(self) -> list[tuple[str, str, str]]:
+        """(name, kind, unit) of every row of C as it is now."""
+        return self.keep_row_names()()
+
+    def keep_row_names(self) -> Callable[[], list[tuple[str, str, str]]]:
+        """`row_names` of this moment, to be worked out whenever somebody asks."""
+        return partial(self._name_rows, [block.keep() for block in self.blocks])
+
+    def _name_rows(self, names: list[Callable[[], list[str]]]) -> list[tuple[str, str, str]]:
+        return [
+            (name, block.kind, block.unit)
+            for block, called in zip(self.blocks, names, strict=True)
+            for name in called()
+        ]
+
     def edge_names(self) -> list[str]:
-        """Name of every support-polygon row: the two feet that its edge joins."""
+        """Name of every support-polygon row: the two feet that its edge joins, or a side of the region."""
         if self.phase.polygon is None:
             return []
+        if self.phase.region:
+            angles = np.degrees(np.arctan2(*self.phase.polygon.normals.T[::-1]))
+            return [f"support region, side towards {angle:.0f} deg" for angle in angles]
         feet = [c.frame for c in self.phase.phase.contacts]
         return [f"support polygon edge {feet[i]}-{feet[j]}" for i, j in self.phase.polygon.edges]
 
@@ -344,6 +378,14 @@ class Stack:
             self._name_errors, self.rows.error.copy(), self.hard_error[self.rows.hard :].copy(),
             self._posture_goal - joints,
         )  # fmt: skip
+
+    def keep_measures(self) -> Callable[[], dict[str, float]]:
+        """What is reported of this moment beside errors, to be worked out whenever somebody asks.
+
+        Keys: '<task>.manipulability', w of a manipulability task.
+        """
+        q, ascents = self.kinematics.q.copy(), self.ascents
+        return lambda: {f"{ascent.label}.manipulability": ascent.value_at(q) for ascent in ascents}
 
     def _name_errors(self, error: Array, hard_joints: Array, postures: Array) -> dict[str, float]:
         found = {f"{label}.{part}": _norm(error[span]) for label, part, span in self.rows.labels}

@@ -53,6 +53,7 @@ class Tick:
         "__dict__",
         "_errors",
         "_held_back",
+        "_measures",
         "com",
         "margin",
         "microseconds",
@@ -67,6 +68,7 @@ class Tick:
         self.t, self.q, self.v = loop.t, loop.q, v
         self.com, self.margin = stack.kinematics.com.copy(), stack.margin
         self._errors, self._held_back = stack.keep_errors(), held_back
+        self._measures = stack.keep_measures()
         promised = loop.compiled.margin
         self.warning = ""
         if promised is not None and self.margin < promised - 1e-6:
@@ -80,6 +82,14 @@ class Tick:
         Keys: '<task>.position' [m], '<task>.orientation' [rad], '<task>.joints' [rad].
         """
         return self._errors()
+
+    @cached_property
+    def measures(self) -> Mapping[str, float]:
+        """What tasks without a target are at, at the end of the step.
+
+        Keys: '<task>.manipulability', w of a `ManipulabilityTask`.
+        """
+        return self._measures()
 
     @cached_property
     def active(self) -> tuple[Active, ...]:

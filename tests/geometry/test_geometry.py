@@ -108,6 +108,16 @@ def test_no_inset_is_left_beyond_the_largest_circle(points) -> None:
     assert polygon.margins(grid).max() <= radius + 1e-8
 
 
+def test_between_parallel_edges_the_centre_is_in_the_middle() -> None:
+    """A whole segment of points has the largest margin there; an end of it would lean to one side."""
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    for rotation in (np.eye(2), turn, turn.T, np.array([[0.0, -1.0], [1.0, 0.0]])):
+        corners = np.array([[0.4, 0.28], [-0.4, 0.28], [0.4, -0.28], [-0.4, -0.28]]) @ rotation.T + [1.0, 2.0]
+        center, radius = support_polygon(corners).chebyshev()
+        np.testing.assert_allclose(center, [1.0, 2.0], atol=1e-9)
+        assert radius == pytest.approx(0.28)
+
+
 def test_inset_refuses_a_negative_margin() -> None:
     with pytest.raises(SpecError, match="margin"):
         support_polygon(SQUARE).inset(-0.1)

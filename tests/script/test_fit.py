@@ -62,6 +62,10 @@ def loop(robot: wb.Robot, pose: str = "stand", feet: tuple[str, ...] = FOUR, **f
             r"phase 'try'\.roles: limb 'leg3' does not exist; there are: limb1, limb2$",
         ),
         (
+            {"carried": [wb.Carried(BOX, by="limb1_tip", pads=["limb1_pad_c"])]},
+            r"carried: body 'box'\.pads: .* no frame 'limb1_pad_c'; closest names: .*limb1_pad_a",
+        ),
+        (
             {"carried": [wb.Carried(BOX, by="limb1_tp")]},
             r"phase 'try'\.carried: body 'box'\.by: .*'limb1_tp'.*limb1_tip",
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -115,6 +116,8 @@ def test_a_body_has_a_name_mass_size_and_place(fields: dict[str, Any], says: str
         ({"by": ""}, r"Carried 'box'\.by: expected a name"),
         ({"by": None}, r"Carried 'box'\.by: expected a name"),
         ({"pose": np.zeros(3)}, r"Carried 'box'\.pose: expected pin\.SE3"),
+        ({"pads": "tip"}, r"Carried 'box'\.pads: expected a list of frames, got 'tip'"),
+        ({"pads": [""]}, r"Carried 'box'\.pads: expected a name"),
         ({"pose": None}, r"Carried 'box'\.pose: expected pin\.SE3"),
         (
             {"pose": pin.SE3(np.eye(3), np.array([0.0, np.nan, 0.0]))},
@@ -193,12 +196,33 @@ def test_a_duration_is_finite_and_positive(duration: Any) -> None:
             r"phase 'p'\.limits: more than one JointLimits",
         ),
         ({"limits": [wb.SupportPolygon()] * 2}, r"phase 'p'\.limits: more than one SupportPolygon"),
+        (
+            {"soft": [[wb.ComTask()], wb.PostureTask()]},
+            r"phase 'p'\.soft: expected tasks, or levels .*both",
+        ),
+        ({"soft": [[wb.ComTask()], [3]]}, r"phase 'p'\.soft\[1\]: expected Task, got 3"),
+        ({"soft": [[wb.ComTask()], []]}, r"phase 'p'\.soft\[1\]: expected one task or more in a level"),
+        ({"soft": [[wb.ComTask()], [wb.ComTask()]]}, "named more than once: com"),
+        (
+            {"soft": [[wb.DampingTask()], [wb.ComTask()]]},
+            r"phase 'p'\.soft\[0\]: damping would forbid the levels below all motion",
+        ),
         ({"hard": [wb.DampingTask()]}, r"phase 'p'\.hard: a damping task forbids all motion; put it in soft"),
     ],
 )
 def test_a_phase_refuses_by_its_field(fields: dict[str, Any], says: str) -> None:
     with pytest.raises(wb.SpecError, match=says):
         wb.Phase(**{"name": "p", **fields})
+
+
+def test_levels_keep_their_order() -> None:
+    a, b, c = wb.ComTask(), wb.PostureTask(), wb.DampingTask()
+    flat, layered = wb.Phase("p", soft=[a, b, c]), wb.Phase("p", soft=[[a], (b, c)])
+    assert flat.levels == (flat.soft,) == ((a, b, c),)
+    assert layered.levels == layered.soft == ((a,), (b, c))
+    assert flat.soft_tasks == layered.soft_tasks == flat.tasks == (a, b, c)
+    assert replace(layered, name="q").levels == layered.levels
+    assert wb.Phase("p").levels == ((),)
 
 
 def test_a_phase_keeps_copies() -> None:

@@ -22,7 +22,7 @@ for folder in (HERE, HERE.parent):  # this robot's modules, and the helpers that
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
 
-from legarm_links import arm1, arm2, body, hip, jaw, shank, shank1, slide, thigh  # noqa: E402
+from legarm_links import PAD, RUBBER, arm1, arm2, body, hip, jaw, shank, shank1, slide, thigh  # noqa: E402
 from legarm_table import ARMS, LEGS, LIMBS, MATERIALS, NAME, NOTE, T  # noqa: E402
 from servos import DRS_0101, DRS_0401  # noqa: E402
 from shapes import ORIGIN  # noqa: E402
@@ -118,6 +118,12 @@ def arm(limb: str) -> tuple[list[Link], list[Joint]]:
             )
         )
     joints += [fixed(f"{limb}_foot", f"{limb}_slide", 0.0), fixed(f"{limb}_tip", f"{limb}_arm2", T.arm2)]
+    if limb == "limb1":  # the middle of each finger's rubber face: what it holds things with
+        links += [Link(f"{limb}_pad_{letter}") for letter in "ab"]
+        joints += [
+            fixed(f"{limb}_pad_{letter}", f"{limb}_jaw_{letter}", PAD, -side * RUBBER)
+            for letter, side in (("a", 1.0), ("b", -1.0))
+        ]
     return links, joints
 
 
@@ -162,9 +168,9 @@ def root_joints(limb: str, third: str) -> list[Joint]:
     ]
 
 
-def fixed(frame: str, parent: str, x: float) -> Joint:
+def fixed(frame: str, parent: str, x: float, y: float = 0.0) -> Joint:
     """The joint that holds a tip's frame."""
-    return Joint(f"{frame}_fixed", "fixed", parent, frame, (x, 0.0, 0.0))
+    return Joint(f"{frame}_fixed", "fixed", parent, frame, (x, y, 0.0))
 
 
 ROLES: Mapping[str, Mapping[str, float]] = {
@@ -233,7 +239,7 @@ NEVER: tuple[tuple[str, tuple[str, ...], str, tuple[str, ...]], ...] = (
 
 def unchecked(joints: list[Joint]) -> list[tuple[str, str, str]]:
     """Link pairs that need no collision check, with the reason."""
-    frames = {f"{limb}_{tip}" for limb in LIMBS for tip in ("foot", "tip")}
+    frames = {f"{limb}_{tip}" for limb in LIMBS for tip in ("foot", "tip", "pad_a", "pad_b")}
     pairs = [(j.parent, j.child, "Adjacent") for j in joints if j.child not in frames]
     pairs += [(f"{limb}_jaw_a", f"{limb}_jaw_b", "Default") for limb in ARMS]  # they close on each other
     for one, mine, other, theirs in NEVER:

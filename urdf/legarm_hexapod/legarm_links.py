@@ -180,6 +180,10 @@ def arm2(limb: str, structure: float) -> Link:
     return Link(f"{limb}_arm2", tuple(parts), structure, covers)
 
 
+RUBBER = 0.0080  # a finger's rubber face beside the line from its hinge
+PAD = 0.0315  # the face's middle, from the hinge
+
+
 def jaw(limb: str, letter: str, structure: float) -> Link:
     """A gripper finger (limb 1) or a scissor blade (limb 2), along +x from its hinge when closed."""
     side = 1.0 if letter == "a" else -1.0
@@ -196,7 +200,7 @@ def jaw(limb: str, letter: str, structure: float) -> Link:
             rod((0.0, 0.0, -0.0035), (0.0, 0.0, 0.0035), 0.004, "dark_aluminium"),
             slab(0.0, end, -0.0055, -0.0010, -0.0035, 0.0035, "aluminium", False),
             slab(0.014, end, -0.0055, -0.0030, -0.0090, 0.0090, "aluminium", False),
-            slab(0.014, end, -0.0080, -0.0055, -0.0090, 0.0090, "palm_rubber", False),
+            slab(0.014, end, -RUBBER, -0.0055, -0.0090, 0.0090, "palm_rubber", False),
         ]
         cover = slab(0.0, end, -0.0080, -0.0010, -0.0090, 0.0090, "aluminium", False)
     else:

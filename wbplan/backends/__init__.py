@@ -21,4 +21,9 @@ def make_backend(name: str, stack: Stack) -> Backend:
     """
     if name not in BACKENDS:
         raise SpecError(f"backend '{name}' does not exist; there are: {', '.join(BACKENDS)}")
+    levels = len(stack.phase.phase.levels)
+    if levels > 1:
+        raise SpecError(
+            f"backend '{name}' has no strict priorities: expected one level of soft tasks, got {levels}"
+        )
     return BACKENDS[name](stack)

@@ -32,7 +32,7 @@ ROUNDING = 1e-10
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _fill(
-    H: Any, g: Any, A: Any, b: Any, C: Any, d: Any, lower: Any, upper: Any, sides: Any, edges: Any,
+    H: Any, g: Any, A: Any, b: Any, C: Any, d: Any, lower: Any, upper: Any, sides: Any, rows: Any,
     K: Any, rhs: Any,
 ) -> None:  # fmt: skip
     n, m = g.shape[0], b.shape[0]
@@ -52,8 +52,8 @@ def _fill(
             K[k, i] = K[i, k] = 1.0
             rhs[k] = upper[i] if sides[i] > 0 else lower[i]
             k += 1
-    for e in range(edges.shape[0]):
-        if edges[e]:
+    for e in range(rows.shape[0]):
+        if rows[e]:
             for j in range(n):
                 K[k, j] = K[j, k] = C[e, j]
             rhs[k] = d[e]
@@ -62,8 +62,8 @@ def _fill(
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _holds(
-    solved: Any, A: Any, b: Any, C: Any, d: Any, lower: Any, upper: Any, sides: Any, edges: Any,
-    z_box: Any, z_edges: Any, rounding: float,
+    solved: Any, A: Any, b: Any, C: Any, d: Any, lower: Any, upper: Any, sides: Any, rows: Any,
+    z_box: Any, z_rows: Any, rounding: float,
 ) -> bool:  # fmt: skip
     n, m = lower.shape[0], b.shape[0]
     for i in range(n):
@@ -89,10 +89,10 @@ def _holds(
             if sides[i] * solved[k] < -rounding:
                 return False
             k += 1
-    for e in range(edges.shape[0]):
-        z_edges[e] = 0.0
-        if edges[e]:
-            z_edges[e] = solved[k]
+    for e in range(rows.shape[0]):
+        z_rows[e] = 0.0
+        if rows[e]:
+            z_rows[e] = solved[k]
             if solved[k] < -rounding:
                 return False
             k += 1
@@ -106,7 +106,7 @@ class ActiveSetGuess:
     def __init__(self, stack: Stack) -> None:
         n, m, e = len(stack.g), len(stack.b), len(stack.d)
         self._stack = stack
-        self._sides, self._edges = np.zeros(n, dtype=np.int64), np.zeros(e, dtype=np.bool_)
+        self._sides, self._rows = np.zeros(n, dtype=np.int64), np.zeros(e, dtype=np.bool_)
         self._size = n + m
         most = 2 * n + m + e
         self._matrix, self._vector = np.zeros(most * most), np.zeros(most)
@@ -115,20 +115,21 @@ class ActiveSetGuess:
         """The QP's solution (nf,) and its multipliers, or None if it is not with these bounds."""
         s, size = self._stack, self._size
         K, rhs = self._matrix[: size * size].reshape(size, size), self._vector[:size]
-        problem = (s.A, s.b, s.C, s.d, s.lower, s.upper, self._sides, self._edges)
+        problem = (s.A, s.b, s.C, s.d, s.lower, s.upper, self._sides, self._rows)
         _fill(s.H, s.g, *problem, K, rhs)
         # K is symmetric: its transpose is the same matrix in LAPACK's order, taken without a copy.
         _, _, solved, info = lapack.dgesv(K.T, rhs, overwrite_a=True, overwrite_b=True)
         n, m = len(s.g), len(s.b)
-        box, edges = np.empty(n), np.empty(len(s.d))
-        if info != 0 or not _holds(solved, *problem, box, edges, ROUNDING):
+        box, rows = np.empty(n), np.empty(len(s.d))
+        if info != 0 or not _holds(solved, *problem, box, rows, ROUNDING):
             return None
-        return solved[:n].copy(), Multipliers(solved[n : n + m].copy(), edges, box)
+        return solved[:n].copy(), Multipliers(solved[n : n + m].copy(), rows, box)
 
-    def learn(self, box: Array, edges: Array) -> None:
-        """Take over the active bounds of a solver's multipliers, (nf,) and (E,)."""
+    def learn(self, found: Multipliers) -> None:
+        """Take over the active bounds and rows of a solver's multipliers."""
+        box = found.box
         np.sign(np.where(np.abs(box) > ROUNDING, box, 0.0), out=self._sides, casting="unsafe")
-        np.greater(edges, ROUNDING, out=self._edges)
+        np.greater(found.rows, ROUNDING, out=self._rows)
         self._size = (
-            len(self._stack.g) + len(self._stack.b) + int(np.abs(self._sides).sum() + self._edges.sum())
+            len(self._stack.g) + len(self._stack.b) + int(np.abs(self._sides).sum() + self._rows.sum())
         )

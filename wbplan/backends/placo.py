@@ -22,7 +22,9 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, CompiledPhase, ComTarget, FrameTarget
+from wbplan.aims import ComTarget
+from wbplan.backends.placo_ascent import PlacoAscent
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.joint_box import UNBOUNDED
@@ -71,6 +73,7 @@ class PlacoBackend:
         self._joints_given()
         self._com_tasks()
         self._posture_tasks()
+        self._ascents = [PlacoAscent(ascent, stack, solver) for ascent in stack.ascents]
         self._limits()
 
     def _priority(self, label: str, hard: bool, weight: float) -> tuple[str, float]:
@@ -173,9 +176,9 @@ class PlacoBackend:
     def _margin(self) -> float:
         """The margin to ask for in this tick: what the CoM may leave of its distance to the nearest edge.
 
-        PlaCo has one margin for all edges; those further off are not approached too fast before they are near.
+        PlaCo has one margin for all edges; those further off are slowed down for as they come near.
         """
-        least = float(self._stack.nearest())
+        least = float((self._stack.distances() - self._stack.closer).min())
         if self._patient:
             least = min(least, self._stack.margin)
         self._patient = False
@@ -186,7 +189,7 @@ class PlacoBackend:
     def solve(self) -> Solution:
         """See `Backend.solve`."""
         ease = self._stack.ease
-        for mend in (ease, ease, self._soften, self._wait_for_margin):
+        for mend in (ease, ease, self._soften, self._soften_all, self._wait_for_margin):
             try:
                 return Solution(self._solve())
             except RuntimeError:
@@ -200,6 +203,11 @@ class PlacoBackend:
     def _soften(self) -> None:
         """Hard rows may have come to depend on each other: tell PlaCo those as heavy soft ones."""
         self._soft_labels |= _dependent(self._stack)
+        self._build()
+
+    def _soften_all(self) -> None:
+        """What is missing may be less than PlaCo's solver can see: the tick's own correction sees it."""
+        self._soft_labels |= {label for label, _ in self._stack.hard_names()}
         self._build()
 
     def _wait_for_margin(self) -> None:
@@ -246,6 +254,10 @@ class PlacoBackend:
             goals = posture.next_goal(joints)[columns].tolist()
             for name, goal in zip(names, goals, strict=True):
                 task.set_joint(name, goal)
+        if self._ascents:
+            stack.kinematics.differentiate()
+        for ascent in self._ascents:
+            ascent.aim()
         for k, j, name, task in self._driven:
             task.set_joint(name, float(stack.kinematics.q[j] + stack.driven_step[k]))
         for (task, name), goal in zip(self._hard_joints, stack.hard_joint_goal, strict=True):

@@ -67,9 +67,9 @@ class ProxqpBackend:
         s = self._stack
         if not (self._run() or self._retry() or self._eased() or (self._wait_for_margin() and self._retry())):
             raise solve_error(s, "the QP has no solution")
-        results, edges = self._qp.results, len(s.d)
-        found = Multipliers(np.array(results.y), np.array(results.z[:edges]), np.array(results.z[edges:]))
-        self._guess.learn(found.box, found.edges)
+        results, rows = self._qp.results, len(s.d)
+        found = Multipliers(np.array(results.y), np.array(results.z[:rows]), np.array(results.z[rows:]))
+        self._guess.learn(found)
         return np.array(results.x), found
 
     def _run(self) -> bool:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import files, rules
 from wbplan.errors import BundleError
+from wbplan.obstacles import Obstacle
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ class Trajectory:
             nan while it has none.
         targets: task name -> (N, 7) the pose that it was asked for, world; nan where it was not.
         errors: "<task>.position" [m], "<task>.orientation" [rad] ... -> (N,); nan where absent.
+        measures: "<task>.manipulability" [-] -> (N,); nan where absent.
     """
 
     time: Array
@@ -45,6 +47,7 @@ class Trajectory:
     bodies: Mapping[str, Array] = field(default_factory=dict)
     targets: Mapping[str, Array] = field(default_factory=dict)
     errors: Mapping[str, Array] = field(default_factory=dict)
+    measures: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -74,6 +77,15 @@ class Bundle:
     def phases(self) -> list[dict[str, Any]]:
         """The phases' promises, in the order of time."""
         return list(self.plan["phases"])
+
+    @cached_property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What stands in the world in any phase; a phase's `obstacles` names those that stand in it.
+
+        Raises:
+            BundleError: an entry is no obstacle.
+        """
+        return rules.obstacles_of(self.plan, files.PLAN)
 
     @cached_property
     def model(self) -> Any:
@@ -203,4 +215,5 @@ def _trajectory(arrays: Mapping[str, NDArray[Any]], where: str) -> Trajectory:
         bodies=groups["bodies"],
         targets=groups["targets"],
         errors=groups["errors"],
+        measures=groups["measures"],
     )

@@ -12,7 +12,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.errors import BundleError, listing
+from wbplan.errors import BundleError, SpecError, listing
+from wbplan.obstacles import Obstacle, from_record
 
 if TYPE_CHECKING:
     from wbplan.bundle.data import Trajectory
@@ -23,7 +24,8 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors"}  #: prefix in the file -> field
+#: Prefix in the file -> field.
+GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
 EDGE = 1e-9  #: [s], two times nearer than this are one
@@ -93,6 +95,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
         array = _array(motion, key)
@@ -100,7 +103,7 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
             raise BundleError(f"{where}: {key}: expected shape {shape}, found {array.shape}")
         if key == "phase" and array.dtype.kind not in "iu":
             raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
-        # A margin, object, target or error may be absent at a sample; all else is there or broken.
+        # A margin, object, target, error or measure may be absent at a sample; all else is there or broken.
         if values and key in ("time", "q", "v", "com") and not np.isfinite(array).all():
             at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
@@ -198,14 +201,32 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["dt"].fail("a number above 0")
     if not isinstance(root["report"].value, Mapping):
         raise root["report"].fail("an object")
+    standing = {item.name for item in obstacles_of(plan, where)}
     for phase in root["phases"].items(least=1):
         _check_phase(phase, model)
+        for name in phase["obstacles"].items() if "obstacles" in phase else ():
+            if name.text() not in standing:
+                raise name.fail(f"one of the plan's obstacles, {listing(sorted(standing))}")
     if "joint_acceleration" in root and (root["joint_acceleration"].vector(model.nv - 6) < 0.0).any():
         raise root["joint_acceleration"].fail("bounds of at least 0")
     for body in root["bodies"].items() if "bodies" in root else ():
         body["name"].text()
         body["size"].vector(3)
         body["mass"].number(0.0)
+
+
+def obstacles_of(plan: Mapping[str, Any], where: str) -> tuple[Obstacle, ...]:
+    """The obstacles of a plan.json, or a `BundleError`."""
+    root = _Field(plan, where)
+    found: list[Obstacle] = []
+    for item in root["obstacles"].items() if "obstacles" in root else ():
+        try:
+            found.append(from_record(item.value))
+        except SpecError as error:
+            raise BundleError(f"{item.where}: {error}") from None
+        if found[-1].name in {other.name for other in found[:-1]}:
+            raise item["name"].fail("a name that no other obstacle has")
+    return tuple(found)
 
 
 def _check_phase(phase: _Field, model: Any) -> None:
@@ -229,10 +250,15 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for pad in item["pads"].items() if "pads" in item else ():
+            pad.frame(model)
     for task in phase["tasks"].items():
         task["name"].text()
     if "clearance" in phase:
         phase["clearance"].number()
+    for push in phase["pushes"].items() if "pushes" in phase else ():
+        push["frame"].frame(model)
+        push["force"].vector(3)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 

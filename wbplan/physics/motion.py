@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
@@ -33,6 +33,7 @@ class Span:
         end: [s].
         pads: the frames that press on it; one where it is not clamped.
         friction: of the pads, where the plan says it.
+        holder: the frame that the plan fastens it to.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Span:
     end: float
     pads: tuple[str, ...]
     friction: float | None
+    holder: str
 
 
 @final
@@ -162,13 +164,14 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
         for item in phase["carried"]:
             ends = [(c["frame_a"], c["frame_b"]) for c in phase["closures"]]
             around = [pair for pair in ends if item["frame"] in pair]
-            pads = tuple(dict.fromkeys([item["frame"], *(name for pair in around for name in pair)]))
+            closed = dict.fromkeys([item["frame"], *(name for pair in around for name in pair)])
+            pads = tuple(item.get("pads") or closed)
             start, end = float(phase["start"]) - origin, float(phase["end"]) - origin
             last = next((s for s in reversed(spans) if s.name == item["name"]), None)
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
-                spans[spans.index(last)] = Span(last.name, last.start, end, last.pads, last.friction)
+                spans[spans.index(last)] = replace(last, end=end)
             else:
-                spans.append(Span(item["name"], start, end, pads, item.get("friction")))
+                spans.append(Span(item["name"], start, end, pads, item.get("friction"), item["frame"]))
     return tuple(spans)
 
 

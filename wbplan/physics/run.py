@@ -167,7 +167,7 @@ class _Run:
 
     def _weld(self, weld: int, span: Span) -> None:
         """Fastens an object as it is now in its holder."""
-        holder = self.model.body(span.pads[0]).id
+        holder = self.model.body(span.holder).id
         body = self.scene.objects[span.name][0]
         place, turn, back = np.zeros(3), np.zeros(4), np.zeros(4)
         self.mj.mju_negQuat(back, self.data.xquat[holder])

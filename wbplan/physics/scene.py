@@ -13,19 +13,18 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import Bundle
 from wbplan.errors import PhysicsError
+from wbplan.obstacles import Terrain
 from wbplan.physics.engine import keep_movable, mujoco
 from wbplan.physics.motion import Motion, grip_of
 from wbplan.physics.options import Options
 from wbplan.physics.spec import FLOOR, NOTHING, OBJECT, ROBOT, STAND, robot_spec
+from wbplan.physics.terrain import FLAT, TREAD, add_ground
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 NEAR = 0.01  #: a shape whose surface is this near to a tip's frame [m] belongs to the tip
 SMALL_FOOT = 0.003  #: radius [m] of the ball that a foot without a shape gets
-STEP = 0.06  #: half the width [m] of the ground patch under a foot that treads beside the floor
-FLAT = 0.002  #: a place within this [m] of the floor is on the floor
-TREAD = 0.03  #: thickness [m] of patches and stands
 
 
 @final
@@ -133,7 +132,7 @@ def scene_of(
                 grip = grip_of(span, motion.friction, options)
                 spec.geom(name).friction = [grip, grip * options.patch, 0.0001]
                 spec.geom(name).condim = 4
-    floor = _add_ground(spec, motion)
+    floor = add_ground(spec, motion, bundle.obstacles)
     _add_objects(spec, bundle, motion, floor, options)
     pins = _add_pins(spec, motion, options)
     welds = _add_welds(spec, bundle, motion, options)
@@ -194,31 +193,6 @@ def _distance(model: Any, data: Any, geom: int, point: Array) -> float:
     return float(np.linalg.norm(np.maximum(out, 0.0)) + min(out.max(), 0.0))
 
 
-def _add_ground(spec: Any, motion: Motion) -> float:
-    """A floor at the lowest foothold; a patch under every foothold that is higher or tilted."""
-    mj = mujoco()
-    heights = motion.places[..., 2][motion.touching]
-    floor = float(heights.min())
-    spec.worldbody.add_geom(
-        name="floor", type=mj.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], pos=[0, 0, floor],
-        contype=FLOOR, conaffinity=0, condim=3,
-    )  # fmt: skip
-    done: set[tuple[float, ...]] = set()
-    for i in range(len(motion.feet)):
-        for k in np.flatnonzero(motion.touching[:, i] & (np.diff(motion.phase, prepend=-1) != 0)):
-            place, normal = motion.places[k, i], motion.normals[k, i]
-            key = tuple(np.round([*place, *normal], 3))
-            if (place[2] - floor < FLAT and normal[2] > 0.9999) or key in done:
-                continue
-            done.add(key)
-            turn = np.array(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).coeffs())
-            spec.worldbody.add_geom(
-                name=f"tread{len(done)}", type=mj.mjtGeom.mjGEOM_BOX, size=[STEP, STEP, TREAD],
-                pos=place - TREAD * normal, quat=turn[[3, 0, 1, 2]], contype=FLOOR, conaffinity=0, condim=3,
-            )  # fmt: skip
-    return floor
-
-
 def _add_objects(spec: Any, bundle: Bundle, motion: Motion, floor: float, options: Options) -> None:
     """Objects as free boxes; where one stands in the air, something to stand on."""
     mj = mujoco()
@@ -240,7 +214,7 @@ def _add_objects(spec: Any, bundle: Bundle, motion: Motion, floor: float, option
         for number, pose in enumerate(_resting(motion, name)):
             R = pin.Quaternion(pose[3:]).toRotationMatrix()
             lowest = pose[2] - np.abs(R[2]) @ np.array(item["size"]) / 2.0
-            if lowest - floor > FLAT:
+            if lowest - max(floor, Terrain(bundle.obstacles).height(pose[0], pose[1])) > FLAT:
                 spec.worldbody.add_geom(
                     name=f"{name}_stand{number}", type=mj.mjtGeom.mjGEOM_BOX, friction=ground, condim=3,
                     size=[*(np.array(item["size"][:2]) / 2.0), TREAD / 2.0],
@@ -289,7 +263,7 @@ def _add_welds(spec: Any, bundle: Bundle, motion: Motion, options: Options) -> l
             names.append(span.name)
             spec.add_equality(
                 name=f"{span.name}_weld", type=mj.mjtEq.mjEQ_WELD, objtype=mj.mjtObj.mjOBJ_BODY,
-                name1=span.pads[0], name2=span.name, active=False,
+                name1=span.holder, name2=span.name, active=False,
             )  # fmt: skip
     return names
 

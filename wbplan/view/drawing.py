@@ -12,7 +12,8 @@ from meshcat.path import Path as NodePath
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.errors import ViewError
-from wbplan.view import shapes
+from wbplan.obstacles import Obstacle
+from wbplan.view import shapes, terrain
 from wbplan.view.figure import Figure
 from wbplan.view.messages import SetProperty, Window
 
@@ -112,6 +113,14 @@ class Drawing:
         path = node("bodies", name)
         self.put(f"{path}/sides", shapes.box(size), shadow=True)
         self.put(f"{path}/edges", shapes.box_edges(size))
+        return path
+
+    def obstacle(self, item: Obstacle) -> str:
+        """Draws an obstacle where it stands; returns its node."""
+        path = node("obstacles", item.name)
+        for part, thing in terrain.things(item).items():
+            self.put(f"{path}/{part}", thing, shadow=part == "sides")
+        self.move(path, item.pose.homogeneous)
         return path
 
     def contact(self, name: str, normal: ArrayLike = (0.0, 0.0, 1.0)) -> str:

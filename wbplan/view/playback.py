@@ -23,6 +23,7 @@ from wbplan.view.messages import SetAnimation, Store, Track, Window, floats
 from wbplan.view.page import still_page
 from wbplan.view.scene import facing, scale
 from wbplan.view.server import Server
+from wbplan.view.terrain import is_grid
 
 if TYPE_CHECKING:
     from wbplan.bundle import Bundle
@@ -172,7 +173,7 @@ class _Playback:
 
     def __init__(self, bundle: Bundle, target: Window, package_dirs: Sequence[str | Path]) -> None:
         self.plan: Mapping[str, Any] = bundle.plan
-        self.trajectory = bundle.trajectory
+        self.trajectory, self.obstacles = bundle.trajectory, bundle.obstacles
         if len(self.trajectory.time) == 0:
             raise ViewError("view: the plan has no samples, nothing can be shown")
         self.figure = Figure(bundle.urdf, package_dirs=package_dirs)
@@ -194,6 +195,7 @@ class _Playback:
         self._contacts()
         self._support()
         self._com()
+        self._obstacles()
         boxes = self._bodies()
         self._targets()
         self._trails()
@@ -271,6 +273,13 @@ class _Playback:
         for i, name in enumerate(GRADES):
             for path in (sphere, shadow):
                 self._visible(f"{path}/{name}", grades == i)
+
+    def _obstacles(self) -> None:
+        """Draws what stands in the world, in the phases in which it does."""
+        for item in self.obstacles:
+            if not is_grid(item):
+                there = np.array([item.name in phase.get("obstacles", ()) for phase in self.phases])
+                self._visible(self.draw_in.obstacle(item), there[self.phase])
 
     def _bodies(self) -> list[Array]:
         """Draws the bodies; returns corners (8, 3) of each where it first and last is."""

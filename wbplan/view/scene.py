@@ -10,6 +10,7 @@ import meshcat
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wbplan.obstacles import Obstacle
 from wbplan.view import shapes
 from wbplan.view.drawing import (
     DISC_Z,
@@ -24,6 +25,7 @@ from wbplan.view.drawing import (
 )
 from wbplan.view.figure import Figure
 from wbplan.view.messages import Window
+from wbplan.view.terrain import is_grid
 
 Array = NDArray[np.float64]
 
@@ -43,6 +45,7 @@ class Scene:
         trails: frames whose past positions are drawn as lines.
         front: (2,), where the robot faces in the world; the camera looks at it from there. If absent:
             towards the bodies, else along x.
+        obstacles: what stands in the world.
 
     Raises:
         ModelError: the URDF cannot be read.
@@ -59,6 +62,7 @@ class Scene:
         urdf_dir: Path | None = None,
         trails: Sequence[str] = (),
         front: ArrayLike | None = None,
+        obstacles: Iterable[Obstacle] = (),
     ) -> None:
         self._sizes = body_sizes(bodies)
         self._figure = Figure(robot_urdf_text, urdf_dir=urdf_dir, package_dirs=package_dirs)
@@ -71,6 +75,9 @@ class Scene:
         self._links = self._draw.robot(self._figure)
         for name, size in self._sizes.items():
             self._draw.show(self._draw.body(name, size), False)
+        for item in obstacles:
+            if not is_grid(item):
+                self._draw.obstacle(item)
         for path in self._draw.com():
             self._draw.show(path, False)
         self._graded: dict[str, int] = {}

@@ -73,16 +73,14 @@ def box(size: ArrayLike) -> Any:
     return mc.Mesh(mc.Box([float(length) for length in np.asarray(size)]), matte(WOOD))
 
 
-def box_edges(size: ArrayLike) -> Any:
+def box_edges(size: ArrayLike, colour: Colour = WOOD_EDGE) -> Any:
     """The twelve edges of a box."""
     corners = (
         np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.asarray(size) * 0.5005
     )
     pairs = [(a, b) for a in range(8) for b in range(a) if (a ^ b).bit_count() == 1]
     ends = corners[np.array(pairs).reshape(-1)]
-    return mc.LineSegments(
-        mc.PointsGeometry(ends.T.astype(np.float32)), mc.LineBasicMaterial(color=WOOD_EDGE)
-    )
+    return mc.LineSegments(mc.PointsGeometry(ends.T.astype(np.float32)), mc.LineBasicMaterial(color=colour))
 
 
 def disc(

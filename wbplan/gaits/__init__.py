@@ -1,0 +1,57 @@
+"""Walking: gaits as data, their margins and speeds, stances, swings, tracks, and phases made of them."""
+
+from wbplan.gaits.gait import Gait
+from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
+from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
+from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
+from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
+from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
+from wbplan.gaits.tracks import Track, arc, on_the_spot, straight, through
+from wbplan.gaits.walking import Manner, Walk, build, walk
+
+__all__ = [
+    "ANT",
+    "CRAB",
+    "MIXED_I",
+    "MIXED_II",
+    "MODES",
+    "Beat",
+    "CosineSwing",
+    "Course",
+    "Excerpt",
+    "Gait",
+    "Manner",
+    "Mode",
+    "QuinticSwing",
+    "Schedule",
+    "Stance",
+    "Step",
+    "Track",
+    "Walk",
+    "Walker",
+    "arc",
+    "beats_of",
+    "best_margin",
+    "build",
+    "course_of",
+    "crawls",
+    "cycle_margins",
+    "flat",
+    "gait_named",
+    "gaits_of",
+    "mode_named",
+    "on_the_spot",
+    "pentagon",
+    "pentapod",
+    "possible",
+    "quadrangular",
+    "regular_stance",
+    "require",
+    "schedule",
+    "step_margins",
+    "straight",
+    "through",
+    "tripod",
+    "walk",
+    "wave",
+]

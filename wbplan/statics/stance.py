@@ -1,0 +1,66 @@
+"""A phase's stance: where its CoM may be, with what it pushes on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wbplan.bodies import frame_number
+from wbplan.errors import SpecError
+from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.script import Phase
+from wbplan.state import State
+from wbplan.statics.region import hull_is_exact, support_region
+from wbplan.tasks import FrameTask
+
+Array = NDArray[np.float64]
+
+
+def support(
+    phase: Phase, model: Any, state: State, points: Array, *, wanted: bool = False
+) -> tuple[HalfPlanes | None, bool]:
+    """The polygon that a phase's CoM keeps to, and whether it is a region rather than the contacts' hull.
+
+    None where the phase has no such limit, unless it is `wanted` all the same.
+
+    Raises:
+        SpecError: the contacts hold the robot nowhere, or a push is not what it has to be.
+    """
+    at = f"phase '{phase.name}'"
+    load = push_load(phase, model, state)
+    if phase.support is None and not wanted:
+        return None, False
+    normals = np.array([c.normal for c in phase.contacts]).reshape(-1, 3)
+    friction = np.array([c.friction for c in phase.contacts])
+    names = ", ".join(c.frame for c in phase.contacts) or "none"
+    region = bool(phase.pushes) or not hull_is_exact(points, normals, friction)
+    try:
+        if not region:
+            return support_polygon(points[:, :2]), False
+        loads = [np.zeros(6), load] if phase.pushes else [load]
+        return support_region(points, normals, friction, loads).polygon, True
+    except SpecError as error:
+        raise SpecError(f"{at}: its contacts ({names}) span no support polygon: {error}") from None
+
+
+def push_load(phase: Phase, model: Any, state: State) -> Array:
+    """(6,) what the pushes do to the robot, about the world's origin, per newton of its weight."""
+    load, at = np.zeros(6), f"phase '{phase.name}'.pushes"
+    held = {c.frame for c in phase.contacts} | {
+        t.frame for t in phase.hard if isinstance(t, FrameTask) and t.path.constant and t.root is None
+    }
+    for push in phase.pushes:
+        frame_number(model, push.frame, at)
+        if push.frame not in held:
+            raise SpecError(
+                f"{at}: '{push.frame}' may move while it pushes; add a hard task that holds it, such as "
+                f"wb.PositionTask('{push.frame}')"
+            )
+        force = -np.array(push.force)
+        load += np.concatenate([force, np.cross(state.pose(push.frame).translation, force)])
+    weight = pin.computeTotalMass(model) * float(np.linalg.norm(model.gravity.linear))
+    per_weight: Array = load / weight
+    return per_weight
