@@ -6,7 +6,7 @@ PY := .venv/bin/python
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test bench lint env env-test env-bench lock clean
+.PHONY: demo test bench soak fuzz lint env env-test env-bench lock clean
 
 demo: env
 	$(PY) -m wbplan run clamp --out out/clamp
@@ -17,6 +17,12 @@ test: env-test
 
 bench: env-bench
 	$(PY) -m wbplan.bench $(ARGS)
+
+soak: env-test
+	$(PY) tests/soak $(ARGS)
+
+fuzz: env-test
+	$(PY) tests/fuzz $(ARGS)
 
 lint: env-test
 	$(PY) -m ruff check .

@@ -122,7 +122,7 @@ def script(
             CARRIERS,
             "arm",
             seconds,
-            carried=[wb.Carried(box, by="limb1_tip")],
+            carried=[wb.Carried(box, by="limb1_tip", grip=wb.Grip("limb2_tip", friction=friction))],
             hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
             soft=[wb.PoseTask("box", path, weight=(400.0, 200.0)), *free_body(seconds)],
         )

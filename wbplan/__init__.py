@@ -2,7 +2,7 @@
 
 from wbplan import gaits
 from wbplan.active import Active
-from wbplan.bodies import Body, Carried
+from wbplan.bodies import Body, Carried, Grip
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.contacts import Contact, Push
@@ -17,7 +17,7 @@ from wbplan.errors import (
     ViewError,
     WbplanError,
 )
-from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
 from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
@@ -54,7 +54,9 @@ __all__ = [
     "Curve",
     "Cylinder",
     "DampingTask",
+    "Forces",
     "GaitError",
+    "Grip",
     "Ground",
     "HeightField",
     "Hold",

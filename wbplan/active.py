@@ -61,20 +61,30 @@ class HeldBack:
         self._stack, self._step = stack, solution.step
         self._history = stack.box.history()
         self._lower, self._upper = stack.lower.copy(), stack.upper.copy()
-        self._multipliers = solution.multipliers
-        self._pull = max(float(np.abs(stack.g).max()), 1e-12)
+        self._multipliers: tuple[Multipliers, ...] = ()
+        if solution.levels:
+            self._multipliers = tuple(level.multipliers for level in solution.levels)
+        elif solution.multipliers is not None:
+            self._multipliers = (solution.multipliers,)
+        self._pull = max(1e-12, *(float(np.abs(level.g).max()) for level in stack.levels))
         self._distances = stack.distances()
         self._row_names = stack.keep_row_names()
 
     def named(self) -> tuple[Active, ...]:
         """Limits and hard rows, the strongest first."""
-        found = self._touched() if self._multipliers is None else self._weighed(self._multipliers)
-        return tuple(sorted(found, key=lambda a: -np.nan_to_num(a.multiplier)))
+        found = [] if self._multipliers else self._touched()
+        for multipliers in self._multipliers:
+            found += self._weighed(multipliers)
+        found.sort(key=lambda a: -np.nan_to_num(a.multiplier))
+        strongest: dict[tuple[str, str], Active] = {}
+        for active in found:
+            strongest.setdefault((active.name, active.kind), active)
+        return tuple(strongest.values())
 
     def _weighed(self, m: Multipliers) -> list[Active]:
         stack, pull = self._stack, self._pull
         found = [
-            self._bound(int(k), m.box[k] > 0, abs(m.box[k]))
+            self._bound(int(k), m.box[k] > 0, abs(m.box[k]) / pull)
             for k in np.flatnonzero(np.abs(m.box) > FAINT * pull)
         ]
         strong = np.flatnonzero(np.abs(m.rows) > FAINT * pull)
@@ -91,7 +101,7 @@ class HeldBack:
         lower, upper = self._stack.box_names()[column]
         bound = self._upper[column] if up else self._lower[column]
         kind = self._stack.box.kind(column, float(bound), self._history)
-        return Active(upper if up else lower, kind, float(multiplier) / self._pull)
+        return Active(upper if up else lower, kind, float(multiplier))
 
     def _touched(self) -> list[Active]:
         """Bounds that the step touches: where the solver gives no multipliers."""

@@ -66,7 +66,7 @@ class ComTarget:
 def balance_target(
     task: BalanceTask, region: HalfPlanes, com: Array, velocity: Array, level: int
 ) -> ComTarget:
-    """The CoM on its way to the point of the region's largest margin, at its own height.
+    """The CoM on its way to the middle of the region's best places, at its own height.
 
     Args:
         task: the task.
@@ -76,7 +76,7 @@ def balance_target(
         level: of the task.
     """
     goal = np.array(com)
-    goal[:2] = region.chebyshev()[0]
+    goal[:2] = region.middle()
     path = Settle(com, velocity * (1.0, 1.0, 0.0), goal, task.settle)
     return ComTarget(task.label, path, task.weight * np.array([1.0, 1.0, 0.0]), task.gain, False, level)
 

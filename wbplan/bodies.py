@@ -68,6 +68,35 @@ def _pose(value: object, what: str) -> Any:
 
 @final
 @dataclass(frozen=True)
+class Grip:
+    """A second frame that clamps a carried body against its holder, by friction: two soft fingers.
+
+    The phase holds both frames together by a hard `RelativePoseTask`. The plan then says how hard they have
+    to squeeze, and no plan is made if friction or servos do not suffice.
+
+    Args:
+        by: the other frame; it and the holder press where their origins are.
+        friction: between finger and body [-].
+        patch: [m], torsion that a finger bears per newton of friction: the mean radius of where it touches.
+        safety: factor on the smallest squeeze that holds the body along its path.
+    """
+
+    by: str
+    friction: float = 0.7
+    patch: float = 0.01
+    safety: float = 2.0
+
+    def __post_init__(self) -> None:
+        at = f"Grip '{name_of(self.by, 'Grip.by')}'"
+        for name, least in (("friction", 0.0), ("patch", 0.0), ("safety", 0.0)):
+            value = number(getattr(self, name), f"{at}.{name}", "a finite positive number", above=least)
+            object.__setattr__(self, name, value)
+        if self.safety < 1.0:
+            raise SpecError(f"{at}.safety: expected a factor of 1 or more, got {self.safety}")
+
+
+@final
+@dataclass(frozen=True)
 class Carried:
     """A body held fast by a frame of the robot for the length of a phase; its weight counts.
 
@@ -76,6 +105,7 @@ class Carried:
         by: the frame that holds it.
         pose: `pin.SE3`, the body in that frame; `AS_IS`: as the two stand when the phase begins. A body
             that stands nowhere yet (no `Body.pose`, not carried before) is then put at the frame itself.
+        grip: a second frame that clamps it.
         pads: frames that press on it, as a gripper's fingers do, by whose friction a simulation holds it;
             where not given, the holder and whatever forms a closed loop with it.
     """
@@ -84,11 +114,14 @@ class Carried:
     by: str
     pose: Any = field(default=AS_IS, compare=False)
     pads: tuple[str, ...] = ()
+    grip: Grip | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):
             raise SpecError(f"Carried.body: expected a wb.Body, got {self.body!r}")
         name_of(self.by, f"Carried '{self.body.name}'.by")
+        if self.grip is not None and not isinstance(self.grip, Grip):
+            raise SpecError(f"Carried '{self.body.name}'.grip: expected a wb.Grip, got {self.grip!r}")
         given: Any = self.pads
         if isinstance(given, str) or not isinstance(given, Iterable):
             raise SpecError(f"Carried '{self.body.name}'.pads: expected a list of frames, got {given!r}")
@@ -101,13 +134,14 @@ class Carried:
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A carried body: its pose in the holding frame, its frame's number in the phase's model, its pads."""
+    """A carried body: its pose in the holder, its own frame's number in the phase's model, its grip."""
 
     body: Body
     holder: str
     T_holder_body: Any
     frame: int
     pads: tuple[str, ...] = ()
+    grip: Grip | None = None
 
 
 def frame_number(model: pin.Model, name: str, what: str) -> int:
@@ -173,6 +207,6 @@ def with_carried(
         inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()
         inertia.lever = np.array(body.com)
         frame = pin.Frame(body.name, holder.parentJoint, by, placement, pin.FrameType.BODY)
-        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads))
+        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads, item.grip))
         model.appendBodyToJoint(holder.parentJoint, inertia, placement)
     return model, tuple(held)

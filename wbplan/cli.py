@@ -1,4 +1,4 @@
-"""The command line: list, run, check, simulate, view, robot, papers.
+"""The command line: list, run, check, simulate, view, robot, gaits, papers.
 
 Exit codes: 0 done, and every promise holds; 1 a promise is broken, no plan exists, or it does not stand;
 2 bad usage or bad input, told on stderr without a traceback; 130 interrupted.
@@ -23,6 +23,7 @@ from wbplan import catalog
 from wbplan.bundle import Bundle, is_bundle
 from wbplan.checks import check as recompute
 from wbplan.errors import BundleError, CheckFailed, GaitError, PlanFalls, SolveError, SpecError, WbplanError
+from wbplan.gaits import Walker, comfortable, cycle_figure, gait_for, gaits_of, mode_named
 from wbplan.live import LiveView
 from wbplan.papers import DIFFERS, report, summary
 from wbplan.physics import ghost_of
@@ -31,6 +32,7 @@ from wbplan.planner import plan
 from wbplan.printing import print_plan, print_robot, print_simulation
 from wbplan.robot import Robot, load_robot
 from wbplan.script import Script
+from wbplan.survey import distinct, survey, table
 from wbplan.taskfile import glance, load_task
 from wbplan.tick import Loop
 from wbplan.version import VERSION
@@ -135,6 +137,9 @@ def run(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the task; may be repeated."),
     ] = None,
+    robot_name: Annotated[
+        str | None, typer.Option("--robot", metavar="ROBOT", help="Another robot, if the task takes others.")
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Serve the plan in Meshcat until Ctrl-C.")] = False,
 ) -> None:
     """Plan a task, write its bundle, and check every promise of it."""
@@ -143,7 +148,7 @@ def run(
     folder = out if out is not None else Path("out") / file.name
     _require_place(folder)
 
-    robot = load_robot(file.robot)
+    robot = load_robot(file.robot_for(robot_name))
     script = file.script(robot, values)
     with _live_view(robot, script, view) as observe, _progress_bar(file.name) as progress:
         planned = plan(
@@ -222,6 +227,38 @@ def robot(
 ) -> None:
     """Summary of a robot: limbs, frames, mass, limits, and the problems found."""
     print_robot(load_robot(name_or_path), _console())
+
+
+@app.command()
+def gaits(
+    robot_name: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot's name, or a path to a URDF.")],
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="GAIT ...", help="All where not given.")
+    ] = None,
+    mode: Annotated[str, typer.Option(help="free, crab, ant, mixed1 or mixed2.")] = "free",
+    cycles: Annotated[float, typer.Option(min=0.1, help="How far to walk, in strides.")] = 2.0,
+    figure: Annotated[
+        Path | None, typer.Option(help="A PNG file for the margins over a cycle of every gait.")
+    ] = None,
+) -> None:
+    """Walk every gait of a robot: speed, distance, margin, slip and clearance, planned and measured."""
+    loaded, way = load_robot(robot_name), mode_named(mode)
+    if figure is not None:
+        walker = Walker(loaded)
+        stance = walker.stance(lean=way.lean)
+        stance, stroke = comfortable(walker, stance, 0.1 * stance.height)
+        chosen = [
+            gait_for(walker, name, stance, way.heading, stroke)
+            for name in names or distinct(gaits_of(walker.ring))
+        ]
+        cycle_figure(chosen, stance.feet, way.heading, stroke, f"{loaded.name}, {way.name}").savefig(
+            figure, dpi=110
+        )
+    rows = list(survey(loaded, names, mode=way, cycles=cycles))
+    _console().print(table(rows, f"{loaded.name}, {way.name}: {cycles:g} cycles of every gait"))
+    broken = [row.gait for row in rows if not row.held]
+    if broken:
+        raise CheckFailed(f"promises are broken in {', '.join(broken)}", broken)
 
 
 @app.command()

@@ -219,6 +219,8 @@ class JointBox:
         q_index: (n,) where the free joints are in q.
         previous, older: (n,) the last step and the one before it.
         left: ticks before the robot is to be at rest, this one included.
+        reach, most: (n,) how far the speed limits let the joints go in a tick, and how much further or less
+            far than in the last one.
         ticks: M of the last `fill`; factor: of the steps, when all joints slow down at once.
     """
 
@@ -230,21 +232,22 @@ class JointBox:
         self.q_index = joints + 1
         self.previous, self.older, self.left = np.zeros(n), np.zeros(n), NEVER
         self.ticks, self.factor = 1.0, 0.0
+        self.reach, self.most = np.full((2, n), UNBOUNDED)
         self._limited, self._jerky = limits is not None, False
         if limits is None:
             return
         self._q_lower = np.array(model.lowerPositionLimit)[self.q_index]
         self._q_upper = np.array(model.upperPositionLimit)[self.q_index]
-        self._reach = limits.speed * np.array(model.velocityLimit)[joints] * dt
+        self.reach = limits.speed * np.array(model.velocityLimit)[joints] * dt
         self.most = phase.acceleration[joints - 6] * dt**2
         self.slowing = BRAKING * phase.braking[joints - 6] * dt**2
         if phase.jerk is not None:
             self._jerky = True
             self._jerk = phase.jerk[joints - 6] * dt**3
             self._share = np.minimum(
-                0.9, np.minimum(BRAKING * self._jerk / (2 * self.most), self.slowing / self._reach)
+                0.9, np.minimum(BRAKING * self._jerk / (2 * self.most), self.slowing / self.reach)
             )
-            self._rest = _ways_to_rest(self._share, self._reach, self.slowing)
+            self._rest = _ways_to_rest(self._share, self.reach, self.slowing)
 
     def brake_as(self, acceleration: Array) -> None:
         """Count on no more for braking than these (n,) accelerations of the free joints [rad/s^2, m/s^2]."""
@@ -266,12 +269,12 @@ class JointBox:
         p, left = self.previous, self.left
         self.ticks, self.factor = stopping(*limits, self.slowing, p, distances, closing, left)
         box(
-            *limits, self._reach, self.most, self.slowing, p, left, self.ticks, self.factor, ease, self.lower,
+            *limits, self.reach, self.most, self.slowing, p, left, self.ticks, self.factor, ease, self.lower,
             self.upper,
         )  # fmt: skip
         if self._jerky:
             jerk_box(
-                *limits, self._reach, self.most, self._jerk, self._share, self._rest, p, self.older, left,
+                *limits, self.reach, self.most, self._jerk, self._share, self._rest, p, self.older, left,
                 self.lower, self.upper,
             )  # fmt: skip
 
@@ -298,7 +301,7 @@ class JointBox:
             return "acceleration"
         if self._jerky and abs(bound - 2 * p + older[j]) >= self._jerk[j] * (1 - SAME):
             return "jerk"
-        return "speed" if abs(bound) >= self._reach[j] * (1 - SAME) else "position"
+        return "speed" if abs(bound) >= self.reach[j] * (1 - SAME) else "position"
 
 
 def _ways_to_rest(share: Array, reach: Array, last: Array) -> Array:

@@ -71,6 +71,33 @@ def _bounds(given: Any, what: str) -> Bounds | None:
 
 @final
 @dataclass(frozen=True)
+class Forces:
+    """Contact forces exist that carry the motion, within friction and what the servos can give.
+
+    At every sample, with the plan's own accelerations (means over a tenth of a second): forces in the
+    friction cones meet Newton's and Euler's equations, use at most `friction` of the friction and leave the
+    joints at most `torque` of the URDF's effort. They are looked for once the motion is planned; if there are
+    none, there is no plan. Without this limit a plan promises shares of 1 where they hold, and warns where
+    not.
+
+    Args:
+        friction: share of the contacts' friction that may be used, in (0, 1].
+        torque: share of the joints' effort that may be used, in (0, 1].
+    """
+
+    friction: float = 1.0
+    torque: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "torque"):
+            share = number(getattr(self, name), f"Forces.{name}", "a share in (0, 1]", above=0.0)
+            if share > 1.0:
+                raise SpecError(f"Forces.{name}: expected a share in (0, 1], got {share}")
+            object.__setattr__(self, name, share)
+
+
+@final
+@dataclass(frozen=True)
 class SupportPolygon:
     """The CoM of robot and carried bodies stays `margin` [m] inside the hull of the phase's contacts.
 

@@ -32,9 +32,9 @@ class Objective(Task):
 class BalanceTask(Objective):
     """Draws the CoM toward the point of largest margin of the phase's support region.
 
-    A CoM task in x and y (the height is free) whose target is the centre of the largest circle inside the
-    region. The target goes there from where the CoM is when the phase begins, with the CoM's velocity then,
-    and comes to rest after `settle` seconds: it never jumps, nor does its velocity.
+    A CoM task in x and y (the height is free) whose target is the middle of the region's places whose margin
+    is the largest, or 1 % less. The target goes there from where the CoM is when the phase begins, with the
+    CoM's velocity then, and comes to rest after `settle` seconds: it never jumps, nor does its velocity.
 
     The phase needs a support limit or three contacts that are not on one line.
 

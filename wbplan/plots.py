@@ -6,6 +6,7 @@ matplotlib is imported when a picture is made, not before, and nothing of pyplot
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -84,9 +85,10 @@ def _png(drawing: Figure) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     file = io.BytesIO()
-    # Without the version in it the same plan makes the same file.
     canvas: Any = FigureCanvasAgg(drawing)
-    canvas.print_png(file, metadata={"Software": None})
+    with warnings.catch_warnings():  # labels of absurd numbers leave no room
+        warnings.simplefilter("ignore", UserWarning)
+        canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
     return file.getvalue()
 
 
@@ -177,7 +179,7 @@ def _feet(axes: Axes, named: list[tuple[str, Array]]) -> None:
     for name, spot in dict(reversed(named)).items():  # of each foot the first
         up = spot[1] >= middle[1] - 1e-3
         axes.annotate(
-            name.removesuffix("_foot"),
+            _short(name.removesuffix("_foot"), 24),
             tuple(spot[:2].tolist()),
             xytext=(0.0, 7.0 if up else -7.0),
             textcoords="offset points",
@@ -228,8 +230,8 @@ def _errors(axes: Axes, bundle: Bundle, parts: tuple[str, ...], unit: str) -> No
         if name.startswith("contact("):
             contacts.append(values)
         elif name in colors:
-            label, style = (name, "-") if part == parts[0] else (f"{name}, {part}", "--")
-            axes.plot(time, drawn, style, color=colors[name], linewidth=1.3, label=label)
+            said, style = (name, "-") if part == parts[0] else (f"{name}, {part}", "--")
+            axes.plot(time, drawn, style, color=colors[name], linewidth=1.3, label=_short(said, 40))
         else:
             rest += 1
             axes.plot(time, drawn, color="#c3cbd2", linewidth=0.8, zorder=1)
@@ -294,11 +296,11 @@ def _joints(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
         if limbs[row] != limbs[row - 1]:
             axes.axhline(row, color="white", linewidth=2.0)
     if len(names) <= 32:
-        axes.set_yticks(rows[:-1] + 0.5, names, fontsize=6.5)
+        axes.set_yticks(rows[:-1] + 0.5, [_short(name, 24) for name in names], fontsize=6.5)
     else:
         starts = [row for row in rows[:-1] if row == 0 or limbs[row] != limbs[row - 1]]
         ends = [*starts[1:], len(names)]
-        axes.set_yticks([(a + b) / 2 for a, b in zip(starts, ends, strict=True)], [limbs[a] for a in starts])
+        axes.set_yticks(np.add(starts, ends) / 2, [_short(limbs[a], 24) for a in starts])
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
     for edge in [phase["start"] for phase in bundle.phases[1:]]:

@@ -29,16 +29,32 @@ class Multipliers:
 
 @final
 @dataclass(frozen=True, slots=True)
+class LevelSolution:
+    """What one of several levels of soft tasks came to.
+
+    Attributes:
+        x: (nf,) the step over the free columns with this level and those above.
+        multipliers: of this level's own program.
+    """
+
+    x: Array
+    multipliers: Multipliers
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Solution:
     """A step and what held it back.
 
     Attributes:
         step: (nv,) tangent step dq over one tick [m, rad].
-        multipliers: what held the step back; None where the backend has none.
+        multipliers: what held the step back, with several levels the first; None where the backend has none.
+        levels: every level's outcome where there are several, else empty.
     """
 
     step: Array
     multipliers: Multipliers | None = None
+    levels: tuple[LevelSolution, ...] = ()
 
 
 class Backend(Protocol):

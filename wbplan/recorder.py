@@ -14,6 +14,7 @@ from wbplan.compiled import CompiledPhase
 from wbplan.obstacles import to_record
 from wbplan.robot import Robot
 from wbplan.script import Script
+from wbplan.statics import Stance, plan_forces, promised
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION
 
@@ -43,6 +44,7 @@ class Recorder:
         self._warnings: list[str] = []
         self._phases: list[dict[str, Any]] = []
         self._placed: Mapping[str, Any] = {}
+        self._stances: list[Stance] = []
         self._start = 0.0
 
     def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
@@ -89,6 +91,8 @@ class Recorder:
     def end(self, index: int, loop: Loop, elapsed: float) -> None:
         """A phase is over: its entry in plan.json."""
         phase = loop.compiled.phase
+        compiled = loop.compiled
+        self._stances.append(Stance(phase, compiled.model, compiled.contact_points, compiled.held))
         first = self._phase.index(index)
         errors = self._errors[first:]
         tasks = []
@@ -135,17 +139,31 @@ class Recorder:
         """Everything recorded, as a bundle."""
         n = len(self._q)
         margin = np.array(self._margin)
+        index = np.array(self._phase, dtype=np.int64)
+        found = plan_forces(self._stances, np.array(self._q), index, self._dt)
+        for entry, stance, forces in zip(self._phases, self._stances, found.phases, strict=True):
+            promises, warning = promised(stance, forces)
+            entry.update(promises)
+            for clamp in forces.clamps:
+                next(item for item in entry["carried"] if item["name"] == clamp.name).update(
+                    clamp.to_record()
+                )
+            self._warnings += [warning] if warning else []
         trajectory = Trajectory(
             time=np.arange(n, dtype=np.float64) * self._dt,
             q=np.array(self._q),
             v=np.array([*self._v, np.zeros(self._robot.model.nv)]),
-            phase=np.array(self._phase, dtype=np.int64),
+            phase=index,
             com=np.array(self._com),
             margin=np.where(np.isfinite(margin), margin, np.nan),
             joint_names=tuple(self._robot.joint_names),
             bodies=_columns(self._bodies, 7),
             targets=_columns(self._targets, 7),
             errors={name: column[:, 0] for name, column in _columns(self._errors, 1).items()},
+            forces=found.forces,
+            moments=found.moments,
+            torque=found.torque,
+            push=found.push,
             measures={name: column[:, 0] for name, column in _columns(self._measures, 1).items()},
         )
         microseconds = np.array(self._microseconds)

@@ -21,6 +21,9 @@ DRIFT = 1e-5
 #: Most corrections in one tick.
 MOST = 4
 
+#: Most iterations of the solver, outer and inner: rows that contradict each other would keep it for minutes.
+PATIENCE = 100
+
 #: Singular values of the hard rows below this share of the largest are left alone: a loop at a singular
 #: configuration is not opened by what it cannot close.
 SINGULAR = 1e-6
@@ -81,7 +84,8 @@ class Retraction:
         n, edges = len(stack.g), len(stack.d)
         qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
         qp.settings.eps_abs = 1e-9
-        qp.settings.primal_infeasibility_solving, qp.settings.max_iter = True, 1000
+        qp.settings.max_iter = qp.settings.max_iter_in = PATIENCE
+        qp.settings.primal_infeasibility_solving = True
         unbounded = np.full(edges, -UNBOUNDED)
         qp.init(np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, unbounded, stack.d, lower, upper)
         qp.solve()

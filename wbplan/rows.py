@@ -1,7 +1,8 @@
 """Which row stands where, and where each row's target is now.
 
 Rows are chosen out of (targets) x (three axes): positions first, then rotations, then CoM. Hard rows come
-before soft ones. `kernels` does the arithmetic; this module knows the layout.
+before soft ones, and those of a higher level before those of a lower. `kernels` does the
+arithmetic; this module knows the layout.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ class Rows:
     Attributes:
         frames: numbers of the frames that have to be read, for `Kinematics`.
         labels: (label, unit, span) of each target's part: 'position' or 'orientation' rows at `span`.
-        hard: number of hard rows, which come first.
+        hard: number of hard rows, which come first; levels: the level of each soft row, in order.
         weight, gain: (n,) of each row; motion: (n,) how far its target moved in the last `advance`.
         error: (n,) target minus actual at the last `measure`.
         position_targets, position_goal (K, 3), position_error (K, 3): targets that ask for a position, where
@@ -125,13 +126,14 @@ class Rows:
             (t, "orientation", places + k, t.rotation_weight) for k, t in enumerate(self.rotation_targets)
         ]
         parts += [(t, "position", self.frame_groups + k, t.weight) for k, t in enumerate(self.com_targets)]
-        parts.sort(key=lambda part: not part[0].hard)
+        parts.sort(key=lambda part: (not part[0].hard, part[0].level))
         chosen: list[int] = []
         masks: list[Array] = []
         weights: list[float] = []
         gains: list[float] = []
         self.labels: list[tuple[str, str, slice]] = []
         self.hard = 0
+        self.levels: list[int] = []
         for target, part, group, weight in parts:
             axes = np.flatnonzero(weight > 0)
             self.labels.append((target.label, part, slice(len(chosen), len(chosen) + len(axes))))
@@ -143,6 +145,8 @@ class Rows:
             weights += [float(w) for w in weight[axes]]
             gains += [target.gain] * len(axes)
             self.hard += len(axes) * target.hard
+            if not target.hard:
+                self.levels += [target.level] * len(axes)
         self.targets_of_rows = [t for t, _, _, w in parts for _ in np.flatnonzero(w > 0)]
         self.chosen = np.array(chosen, dtype=np.intp)
         size = len(chosen)

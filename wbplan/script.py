@@ -11,15 +11,15 @@ from typing import Any, final
 from wbplan.bodies import Body, Carried
 from wbplan.contacts import Contact, Push
 from wbplan.errors import SpecError, listing
-from wbplan.limits import JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
 from wbplan.objectives import ManipulabilityTask, Objective
 from wbplan.obstacles import Obstacle
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
 from wbplan.state import State
 from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 
-Limit = JointLimits | SupportPolygon | SelfCollision | Obstacles
-LIMITS = (JointLimits, SupportPolygon, SelfCollision, Obstacles)
+Limit = JointLimits | SupportPolygon | SelfCollision | Obstacles | Forces
+LIMITS = (JointLimits, SupportPolygon, SelfCollision, Obstacles, Forces)
 
 
 def _tuple_of(items: Iterable[Any], kinds: type | tuple[type, ...], what: str) -> tuple[Any, ...]:
@@ -133,6 +133,14 @@ class Phase:
         _unique([p.frame for p in self.pushes], f"{at}.pushes")
         rows = [t.label for t in self.tasks] + [f"contact({c.frame})" for c in self.contacts]
         _unique(rows, f"{at}: tasks (give name=...)")
+        loops = {frozenset(pair) for pair in self.closures}
+        for item in self.carried:
+            if item.grip is not None and frozenset((item.by, item.grip.by)) not in loops:
+                raise SpecError(
+                    f"{at}.carried: '{item.body.name}' is clamped by '{item.by}' and '{item.grip.by}', which "
+                    "nothing holds together; add to hard "
+                    f"wb.RelativePoseTask('{item.grip.by}', root='{item.by}')"
+                )
         both = sorted(set(self.driven) & set(self.locked))
         if both:
             raise SpecError(f"{at}: joints both driven and locked: {', '.join(both)}")
@@ -183,6 +191,11 @@ class Phase:
     def self_collision(self) -> SelfCollision | None:
         """The limit that keeps the robot from itself, if the phase has it."""
         return next((limit for limit in self.limits if isinstance(limit, SelfCollision)), None)
+
+    @property
+    def forces(self) -> Forces | None:
+        """The limit on contact forces and torques, if the phase has one."""
+        return next((limit for limit in self.limits if isinstance(limit, Forces)), None)
 
     @property
     def obstacles(self) -> Obstacles | None:

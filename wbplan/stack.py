@@ -15,7 +15,6 @@ twice the way to the optimum, so steps settle; for a target that is tracked the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, final
 
@@ -24,9 +23,11 @@ from numpy.typing import NDArray
 
 from wbplan import kernels
 from wbplan.ascent import Ascent
+from wbplan.blocks import RowBlock
 from wbplan.compiled import CompiledPhase, FrameTarget
 from wbplan.joint_box import RECOVERY, JointBox
 from wbplan.kinematics import Kinematics
+from wbplan.levels import Level
 from wbplan.paths import number
 from wbplan.posture import Posture
 from wbplan.rows import Rows, reach
@@ -44,24 +45,6 @@ MARGIN_RESERVE = 1e-4
 
 
 @final
-@dataclass(frozen=True)
-class RowBlock:
-    """Inequality rows of one kind: consecutive rows of C.
-
-    Attributes:
-        kind: in reports: 'margin', 'clearance'; unit: of d, 'm' or 'rad'.
-        span: where its rows stand.
-        keep: called in every tick; what it gives is called when somebody asks what the rows were then, and
-            gives one name a row, '' for a row that is not in use.
-    """
-
-    kind: str
-    unit: str
-    span: slice
-    keep: Callable[[], Callable[[], list[str]]]
-
-
-@final
 class Stack:
     """Matrices of a compiled phase, filled in place.
 
@@ -73,8 +56,9 @@ class Stack:
             `rows` that are hard, then hard joints.
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
-        damping: what stands on the whole diagonal of H, at the last `assemble`.
         blocks: what the rows of C are.
+        levels: the soft tasks by priority; H and g are those of the first.
+        normals: (E, 2) of the support polygon's edges.
         box: the joints' box, whose arrays lower and upper are.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
@@ -93,7 +77,7 @@ class Stack:
         self.driven_step = np.zeros(len(self.driven))
         self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
         self.driving = bool(self._moving_driven)
-        self.drift, self.margin, self.damping, self.easing = 0.0, np.inf, 0.0, 0
+        self.drift, self.margin, self.easing = 0.0, np.inf, 0
         self._hard_rows()
         self._soft_rows()
         self.box = JointBox(phase, dt)
@@ -126,10 +110,10 @@ class Stack:
         self._weight, self._soft_error = rows.weight[soft], rows.error[soft]
         self._soft_motion = rows.motion[soft]
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
-        self._curvature = 0.5 * self._levers(soft) * self._weight**2 * self._pull
+        self._curvature = 0.5 * self.levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
         self._soft_part = self._part(soft, self._soft, self._soft_given)
-        targets = [t for t in self.phase.joint_targets if not t.hard]
+        targets = sorted((t for t in self.phase.joint_targets if not t.hard), key=lambda t: t.level)
         self._posture_goal, self._posture_step = np.zeros((2, len(targets), nf - 6))
         self.postures = [
             Posture(t, self.free, self.dt, self._posture_goal[k], self._posture_step[k])
@@ -139,9 +123,23 @@ class Stack:
         for k, posture in enumerate(self.postures):
             self._stiffness[k] = posture.stiffness
         self._posture_pull = np.array([p.pull for p in self.postures])
-        self._diagonal = np.full(nf, REGULARISATION + self.phase.damping)
-        self._diagonal[6:] += self._stiffness.sum(axis=0)
-        self.H, self.g = np.zeros((nf, nf)), np.zeros(nf)
+        count = len(self.phase.phase.levels)
+        self.levels = [self._level(k, count, [t.level for t in targets]) for k in range(count)]
+        self.H, self.g = self.levels[0].H, self.levels[0].g
+
+    def _level(self, k: int, count: int, postures: list[int]) -> Level:
+        """The k-th level of soft tasks: where its rows and posture tasks stand."""
+        nf = len(self.free)
+        rows = slice(*np.searchsorted(self.rows.levels, (k, k + 1)))
+        tasks = slice(*np.searchsorted(postures, (k, k + 1)))
+        diagonal = np.full(nf, REGULARISATION + (self.phase.damping if k == count - 1 else 0.0))
+        diagonal[6:] += self._stiffness[tasks].sum(axis=0)
+        return Level(
+            self._soft[rows], self._weight[rows], self._soft_rhs[rows], self._soft_error[rows],
+            self._curvature[rows], self._pull[rows], diagonal, self._stiffness[tasks],
+            self._posture_pull[tasks], self._posture_goal[tasks], self._posture_step[tasks],
+            np.zeros((nf, nf)), np.zeros(nf),
+        )  # fmt: skip
 
     def _part(self, span: slice, out: Array, given: Array) -> tuple[Any, ...]:
         """Arguments of `kernels.rows` for a span of rows: all views, taken once."""
@@ -151,14 +149,14 @@ class Stack:
             rows.frame_groups, self.free, self.driven, self.driven_step, out, given,
         )  # fmt: skip
 
-    def _levers(self, soft: slice) -> Array:
-        """Bound on each soft row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
+    def levers(self, rows: slice) -> Array:
+        """Bound on each row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         model, levers = self.phase.model, []
         longest = max(reach(model, k) for k in range(len(model.frames)))
         # A base on its feet moves by the legs that it stands on: their length is its lever arm.
         held = (t for t in self.phase.frame_targets if t.hard)
         standing = max((reach(model, t.frame) for t in held), default=0.0)
-        for target, row in zip(self.rows.targets_of_rows[soft], self.rows.chosen[soft], strict=True):
+        for target, row in zip(self.rows.targets_of_rows[rows], self.rows.chosen[rows], strict=True):
             group = row // 3
             if not isinstance(target, FrameTarget):
                 levers.append(longest)
@@ -170,7 +168,7 @@ class Stack:
 
     def _polygon(self) -> None:
         polygon = self.phase.polygon
-        self._normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
+        self.normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
         self._offsets = np.zeros(0) if polygon is None else np.ascontiguousarray(polygon.offsets)
         edges = len(self._offsets)
         self.C, self.d = np.zeros((edges, len(self.free))), np.zeros(edges)
@@ -213,7 +211,7 @@ class Stack:
         """Kinematics, errors and margin at `q` for the targets as they stand now."""
         rows = self.rows
         self.kinematics.update(q)
-        self.drift, self.margin = rows.measure(self.kinematics, self._normals, self._offsets)
+        self.drift, self.margin = rows.measure(self.kinematics, self.normals, self._offsets)
         self.hard_error[: rows.hard] = rows.error[: rows.hard]
         for i, (joint, _, _) in enumerate(self.hard_joints):
             error = self.hard_joint_goal[i] - q[7 + joint]
@@ -231,27 +229,25 @@ class Stack:
         self.b[: rows.hard] += rows.motion[: rows.hard] - self._hard_given
         np.multiply(self._pull, self._soft_error, out=self._soft_rhs)
         self._soft_rhs += self._soft_motion - self._soft_given
-        self.damping = self.phase.damping + REGULARISATION + kernels.cost(
-            self._soft, self._weight, self._soft_rhs, self._soft_error, self._curvature, self._diagonal,
-            self._stiffness, self._posture_pull, self._posture_goal, self._posture_step, kin.q[self.q_index],
-            self.H, self.g,
-        )  # fmt: skip
+        joints = kin.q[self.q_index]
+        for level in self.levels:
+            level.assemble(joints)
         for ascent in self.ascents:
             ascent.update()
-            ascent.write(self.H, self.g)
+            ascent.write(self.levels[-1].H, self.levels[-1].g)
         self.fill_box()
         self._fill_polygon(self.closer)
 
     def _fill_polygon(self, most: Array) -> None:
         if self.phase.phase.support is not None:
             kernels.polygon(
-                self._normals, self.kinematics.com_jacobian, self.free, self.driven, self.driven_step, most,
+                self.normals, self.kinematics.com_jacobian, self.free, self.driven, self.driven_step, most,
                 self.C, self.d,
             )  # fmt: skip
 
     def distances(self) -> Array:
         """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
-        gaps: Array = self._offsets - self._normals @ self.kinematics.com[:2]
+        gaps: Array = self._offsets - self.normals @ self.kinematics.com[:2]
         return gaps
 
     def fill_box(self) -> None:
@@ -261,11 +257,11 @@ class Stack:
             box.fill(self.kinematics.q, self.closer, self.closer, self.easing)
             return
         inside = self.distances() - (support.margin + MARGIN_RESERVE)
-        closing = self._normals @ self.com_step[:2]
+        closing = self.normals @ self.com_step[:2]
         box.fill(self.kinematics.q, inside, closing, self.easing)
         back = support.recovery_speed * self.dt
-        more = back * self.dt / RECOVERY
-        kernels.approach(inside, closing, box.ticks, box.factor, back, more, self.easing, self.closer)
+        ramp = back * self.dt / RECOVERY
+        kernels.approach(inside, closing, box.ticks, box.factor, back, ramp, self.easing, self.closer)
 
     def ease(self) -> bool:
         """Be less careful in this tick, which found no step; False if that has been tried.
@@ -273,8 +269,7 @@ class Stack:
         All joints are to be able to stop together (0), or each by itself (1), or with nearly all of its
         acceleration (2): where hard tasks lead on, they cannot together. Drift waits (3).
         """
-        most = 3 if self.drift <= SLIGHT else 2
-        if self.easing >= most or self.phase.phase.joint_limits is None:
+        if self.easing >= (3 if self.drift <= SLIGHT else 2) or self.phase.phase.joint_limits is None:
             return False
         self.easing += 1
         self.fill_box()
@@ -283,9 +278,8 @@ class Stack:
             self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard]
         return True
 
-    def begin(self, velocity: Array) -> None:
-        """Start at a velocity (nv,) [m/s, rad/s]."""
-        step = velocity * self.dt
+    def begin(self, step: Array) -> None:
+        """Start after a step (nv,) [m, rad]."""
         self.kinematics.differentiate()
         self.took(step, self.kinematics.com_jacobian @ step)
         self.box.older[:] = self.box.previous
@@ -317,6 +311,11 @@ class Stack:
             inside = self.distances() - (support.margin + MARGIN_RESERVE)
             self._fill_polygon(np.maximum(inside, 0.0) if recovering else inside)
         self.driven_step[:] = given
+
+    @property
+    def reaches(self) -> Array:
+        """(nf - 6,) how far [m or rad] the speed limit lets each free joint move in one tick."""
+        return self.box.reach
 
     # -- names -------------------------------------------------------------------------------------------
 

@@ -1,7 +1,8 @@
 """Task files: one experiment each, found by name or path, its parameters read from their annotations.
 
 A task file has a docstring (what, source), `ROBOT = "name"` and
-`def script(robot, *, parameter: float = default, ...) -> wb.Script`.
+`def script(robot, *, parameter: float = default, ...) -> wb.Script`. One that is written for several robots
+has `ROBOTS = ("name", ...)` too, or `ROBOTS = "any"`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any, Literal, Union, final, get_args, get_origin
 
 from wbplan import catalog
 from wbplan.errors import SpecError, WbplanError, listing
+from wbplan.robot.reading import is_file, is_folder
 from wbplan.script import Script
 
 _SUPPORTED = "float, int, bool, str, tuple of these, Literal[...], or one of these | None"
@@ -72,6 +74,7 @@ class TaskFile:
         name: the file's name without `.py`.
         path: the file.
         robot: name or path of the robot it is written for, its `ROBOT`.
+        robots: all that it may be run with; None: any.
         docstring: what it does, and its source.
         parameters: what `script` takes beside the robot.
         function: its `script`.
@@ -80,6 +83,7 @@ class TaskFile:
     name: str
     path: Path
     robot: str
+    robots: tuple[str, ...] | None
     docstring: str
     parameters: tuple[Parameter, ...]
     function: Callable[..., Any]
@@ -88,6 +92,18 @@ class TaskFile:
     def summary(self) -> str:
         """The docstring's first line."""
         return first_line(self.docstring)
+
+    def robot_for(self, name: str | None) -> str:
+        """Name or path of the robot to run it with: its own, or another that it is written for too.
+
+        Raises:
+            SpecError: it is not written for that one.
+        """
+        if name is None or self.robots is None or name in self.robots:
+            return name or self.robot
+        raise SpecError(
+            f"task '{self.name}' is not written for robot '{name}'; it is for: {listing(self.robots)}"
+        )
 
     def values(self, settings: Sequence[str]) -> dict[str, Any]:
         """Every parameter's value: the default, or what is set.
@@ -142,8 +158,8 @@ def find_task(name_or_path: str | Path) -> Path:
     """
     path = Path(name_or_path).expanduser()
     if path.suffix == ".py" or len(path.parts) > 1:
-        if not path.is_file():
-            what = "is a folder" if path.is_dir() else "does not exist"
+        if not is_file(path):
+            what = "is a folder" if is_folder(path) else "does not exist"
             raise SpecError(f"task file '{path}' {what}; expected a Python file")
         return path
     shipped = catalog.tasks()
@@ -184,6 +200,7 @@ def load_task(name_or_path: str | Path) -> TaskFile:
         name=path.stem,
         path=path,
         robot=_beside(robot, path),
+        robots=_robots(module, robot, path),
         docstring=ast.get_docstring(tree) or "",
         parameters=_parameters(function, path),
         function=function,
@@ -219,6 +236,8 @@ def type_name(annotation: Any) -> str:
         return "one of " + ", ".join(map(str, get_args(annotation)))
     if get_origin(annotation) is tuple:
         kinds = get_args(annotation)
+        if not kinds:
+            return "no value at all"
         if kinds[-1] is Ellipsis:
             return f"{type_name(kinds[0])}s separated by commas"
         return f"{len(kinds)} values separated by commas ({', '.join(map(type_name, kinds))})"
@@ -244,6 +263,16 @@ def _beside(robot: str, path: Path) -> str:
     if not robot.endswith(".urdf") or Path(robot).is_absolute():
         return robot
     return str(path.parent / robot)
+
+
+def _robots(module: types.ModuleType, robot: str, path: Path) -> tuple[str, ...] | None:
+    """All robots that a task may be run with; None: any."""
+    given = getattr(module, "ROBOTS", (robot,))
+    if given == "any":
+        return None
+    if not isinstance(given, tuple | list) or not all(isinstance(name, str) and name for name in given):
+        raise SpecError(f'{path}: ROBOTS: expected names of robots or "any", got {given!r}')
+    return tuple(_beside(name, path) for name in dict.fromkeys((robot, *given)))
 
 
 def _parameters(function: Callable[..., Any], path: Path) -> tuple[Parameter, ...]:

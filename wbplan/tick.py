@@ -153,7 +153,7 @@ class Loop:
         self.velocity = vector(np.zeros(nv) if velocity is None else velocity, nv, "Loop: velocity")
         self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
         joints = self.compiled.free[6:]
-        self.stack.begin(self.velocity)
+        self.stack.begin(self.velocity * self.dt)
         if braking is not None:
             self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
 

@@ -108,14 +108,20 @@ def test_no_inset_is_left_beyond_the_largest_circle(points) -> None:
     assert polygon.margins(grid).max() <= radius + 1e-8
 
 
-def test_between_parallel_edges_the_centre_is_in_the_middle() -> None:
-    """A whole segment of points has the largest margin there; an end of it would lean to one side."""
+def test_the_middle_of_the_best_places_does_not_jump() -> None:
+    """Of a rectangle it is the middle, also with a corner off by a hair; of a triangle nearly its centre."""
     turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
-    for rotation in (np.eye(2), turn, turn.T, np.array([[0.0, -1.0], [1.0, 0.0]])):
-        corners = np.array([[0.4, 0.28], [-0.4, 0.28], [0.4, -0.28], [-0.4, -0.28]]) @ rotation.T + [1.0, 2.0]
-        center, radius = support_polygon(corners).chebyshev()
-        np.testing.assert_allclose(center, [1.0, 2.0], atol=1e-9)
-        assert radius == pytest.approx(0.28)
+    rectangle = np.array([[0.4, 0.28], [-0.4, 0.28], [0.4, -0.28], [-0.4, -0.28]])
+    random = np.random.default_rng(0)
+    for rotation in (np.eye(2), turn, np.array([[0.0, -1.0], [1.0, 0.0]])):
+        corners = rectangle @ rotation.T + [1.0, 2.0]
+        np.testing.assert_allclose(support_polygon(corners).middle(), [1.0, 2.0], atol=1e-9)
+        shaken = support_polygon(corners + random.normal(scale=1e-6, size=corners.shape))
+        np.testing.assert_allclose(shaken.middle(), [1.0, 2.0], atol=3e-4)
+        assert shaken.margin(shaken.middle()) > 0.99 * 0.28 - 1e-5
+    triangle = support_polygon([(0.0, 0.0), (0.6, 0.0), (0.1, 0.4)])
+    centre, radius = triangle.chebyshev()
+    np.testing.assert_allclose(triangle.middle(), centre, atol=0.02 * radius)
 
 
 def test_inset_refuses_a_negative_margin() -> None:

@@ -54,6 +54,13 @@ class PlacoBackend:
         names = list(self._robot.model.names)[2:]
         if names != list(phase.robot.joint_names):
             raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
+        self._names = [frame.name for frame in phase.model.frames]
+        for frame in stack.rows.frames:
+            if self._names.count(self._names[frame]) > 1:
+                raise SpecError(
+                    f"backend 'placo' knows frames by name only, and a link and a joint are both called "
+                    f"'{self._names[frame]}'; rename the joint, or use backend 'proxqp'"
+                )
         self._soft_labels: set[str] = set()
         self._patient = False
         self._build()
@@ -83,7 +90,7 @@ class PlacoBackend:
 
     def _frame_tasks(self, target: FrameTarget, *, rotation: bool) -> list[Any]:
         """One PlaCo task for each distinct weight among the axes."""
-        names = [f.name for f in self._stack.phase.model.frames]
+        names = self._names
         frame, solver = names[target.frame], self._solver
         weights = target.rotation_weight if rotation else target.position_weight
         tasks = []

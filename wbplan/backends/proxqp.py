@@ -12,10 +12,11 @@ import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
+from wbplan.backends.cascade import Cascade
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
 from wbplan.joint_box import UNBOUNDED
-from wbplan.qp import Multipliers, Solution
+from wbplan.qp import LevelSolution, Multipliers, Solution
 from wbplan.stack import Stack
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ class ProxqpBackend:
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
         self._guess = ActiveSetGuess(stack)
+        self._cascade = Cascade(stack) if len(stack.levels) > 1 else None
         self._qp = self._new_solver()
         self._started = False
         self._unbounded = np.full(len(stack.d), -UNBOUNDED)
@@ -44,7 +46,7 @@ class ProxqpBackend:
         qp.settings.eps_abs = 1e-8
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
-        qp.settings.max_iter = 200
+        qp.settings.max_iter = qp.settings.max_iter_in = 200  # inner ones go to 1500 for each outer otherwise
         qp.settings.check_duality_gap = False
         # Steps and their bounds are small numbers: by the usual 1e-4, feasible problems pass for infeasible.
         qp.settings.eps_primal_inf = INFEASIBLE
@@ -57,11 +59,15 @@ class ProxqpBackend:
         s = self._stack
         s.assemble()
         x, multipliers = self._guess.solve() or self._ask_solver()
+        levels: tuple[LevelSolution, ...] = ()
+        if self._cascade is not None:
+            levels = (LevelSolution(x, multipliers), *self._cascade.solve(x, multipliers))
+            x = levels[-1].x
         step = self._rest.copy()
         step[s.free] = np.minimum(np.maximum(x, s.lower), s.upper)
         if s.driving:
             step[s.driven] = s.driven_step
-        return Solution(step, multipliers)
+        return Solution(step, multipliers, levels)
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
@@ -99,5 +105,5 @@ class ProxqpBackend:
     def _retry(self) -> bool:
         """Once more from nothing, with patience: a warm start may be a bad one."""
         self._qp, self._started = self._new_solver(), False
-        self._qp.settings.max_iter = 2000
+        self._qp.settings.max_iter = 1000
         return self._run()

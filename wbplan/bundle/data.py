@@ -34,6 +34,12 @@ class Trajectory:
             nan while it has none.
         targets: task name -> (N, 7) the pose that it was asked for, world; nan where it was not.
         errors: "<task>.position" [m], "<task>.orientation" [rad] ... -> (N,); nan where absent.
+        forces: frame -> (N, 3) [N], world, on the robot, of every contact, push and second finger of a clamp;
+            zero where it does not touch.
+        moments: frame of a second finger -> (N, 3) [N m], likewise.
+        torque: (N, nv-6) [N m, N] of the joints, with these forces and the motion's accelerations.
+        push: (N,) [N], the largest force on the CoM in the worst horizontal direction that the contacts bear;
+            nan where there are too few.
         measures: "<task>.manipulability" [-] -> (N,); nan where absent.
     """
 
@@ -47,6 +53,10 @@ class Trajectory:
     bodies: Mapping[str, Array] = field(default_factory=dict)
     targets: Mapping[str, Array] = field(default_factory=dict)
     errors: Mapping[str, Array] = field(default_factory=dict)
+    forces: Mapping[str, Array] = field(default_factory=dict)
+    moments: Mapping[str, Array] = field(default_factory=dict)
+    torque: Array | None = None
+    push: Array | None = None
     measures: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -153,7 +163,11 @@ class Bundle:
             BundleError: naming the file and the field at fault.
         """
         folder = Path(folder)
-        if not folder.is_dir():
+        try:
+            is_folder = folder.is_dir()
+        except OSError as error:
+            raise BundleError(f"{folder}: cannot be read: {error.strerror or error}") from error
+        if not is_folder:
             found = "a file" if folder.is_file() else "nothing"
             raise BundleError(f"{folder}: expected a folder with a plan bundle, found {found}")
         plan = files.read_plan(folder / files.PLAN)
@@ -172,6 +186,9 @@ class Bundle:
         }
         arrays["phase"] = np.asarray(motion.phase, dtype=np.int64)
         arrays["joint_names"] = np.array(motion.joint_names, dtype=np.str_)
+        for key in rules.OPTIONAL:
+            if getattr(motion, key) is not None:
+                arrays[key] = np.asarray(getattr(motion, key), dtype=np.float64)
         for key, group in rules.GROUPS.items():
             for name, values in getattr(motion, group).items():
                 arrays[f"{key}_{name}"] = np.asarray(values, dtype=np.float64)
@@ -215,5 +232,8 @@ def _trajectory(arrays: Mapping[str, NDArray[Any]], where: str) -> Trajectory:
         bodies=groups["bodies"],
         targets=groups["targets"],
         errors=groups["errors"],
+        forces=groups["forces"],
+        moments=groups["moments"],
+        **{k: rules.as_numbers(arrays[k], f"{where}: {k}") for k in rules.OPTIONAL if k in arrays},
         measures=groups["measures"],
     )

@@ -181,14 +181,22 @@ def plain(value: Any) -> Any:
     raise BundleError(f"{PLAN}: a value of type {type(value).__name__} cannot be written: {value!r}")
 
 
+def _require(path: Path) -> None:
+    try:
+        there = path.is_file()
+    except OSError as error:  # a link to itself, a name that is too long, a folder that may not be entered
+        raise BundleError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if not there:
+        raise BundleError(f"{path}: missing; a bundle has {PLAN}, {URDF} and {ARRAYS}")
+
+
 def read_text(path: Path) -> str:
     """Text of a file.
 
     Raises:
         BundleError: the file is missing, unreadable or not UTF-8.
     """
-    if not path.is_file():
-        raise BundleError(f"{path}: missing; a bundle has {PLAN}, {URDF} and {ARRAYS}")
+    _require(path)
     try:
         return path.read_bytes().decode("utf-8")
     except OSError as error:
@@ -222,8 +230,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     Raises:
         BundleError: the file or one of its arrays cannot be read.
     """
-    if not path.is_file():
-        raise BundleError(f"{path}: missing; a bundle has {PLAN}, {URDF} and {ARRAYS}")
+    _require(path)
     key = ""
     arrays: dict[str, NDArray[Any]] = {}
     try:

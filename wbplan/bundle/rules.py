@@ -24,10 +24,19 @@ SCHEMA = 1  #: version of the bundle's format
 NO_MARGIN = -1e9  #: `margin` of a phase that promises none [m]
 
 NUMBERS = ("time", "q", "v", "com", "margin")
-#: Prefix in the file -> field.
-GROUPS = {"body": "bodies", "target": "targets", "error": "errors", "measure": "measures"}
+OPTIONAL = ("torque", "push")
+#: prefix in the file -> field
+GROUPS = {
+    "body": "bodies",
+    "target": "targets",
+    "error": "errors",
+    "measure": "measures",
+    "force": "forces",
+    "moment": "moments",
+}
 BASE = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 
+MOST = 1e12  #: no length, time, mass or speed of a plan comes near this; squares of larger numbers overflow
 EDGE = 1e-9  #: [s], two times nearer than this are one
 END = 1e-6  #: [s], how far the last phase may end from the last sample
 
@@ -54,6 +63,13 @@ def check_urdf(model: Any, where: str) -> None:
             raise BundleError(
                 f"{where}: joint {model.names[index]} has {model.joints[index].nv} axes; expected 1"
             )
+    placed = [joint.translation for joint in model.jointPlacements] + [
+        f.placement.translation for f in model.frames
+    ]
+    weighed = [[i.mass, *i.lever, *i.inertia.ravel()] for i in model.inertias]
+    for what, numbers in (("origin", np.array(placed)), ("inertial", np.array(weighed))):
+        if not (np.abs(numbers) <= MOST).all():
+            raise BundleError(f"{where}: a number of an {what} is not finite, or beyond {MOST:g}")
     if not pin.computeTotalMass(model) > 0.0:
         raise BundleError(f"{where}: the robot has no mass: {pin.computeTotalMass(model)} kg")
 
@@ -95,6 +111,10 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         **{f"body_{name}": (samples, 7) for name in motion.bodies},
         **{f"target_{name}": (samples, 7) for name in motion.targets},
         **{f"error_{name}": (samples,) for name in motion.errors},
+        **{f"force_{name}": (samples, 3) for name in motion.forces},
+        **{f"moment_{name}": (samples, 3) for name in motion.moments},
+        **({} if motion.torque is None else {"torque": (samples, model.nv - 6)}),
+        **({} if motion.push is None else {"push": (samples,)}),
         **{f"measure_{name}": (samples,) for name in motion.measures},
     }
     for key, shape in shapes.items():
@@ -104,8 +124,8 @@ def check_arrays(motion: Trajectory, model: Any, where: str, *, values: bool) ->
         if key == "phase" and array.dtype.kind not in "iu":
             raise BundleError(f"{where}: phase: expected whole numbers, found {array.dtype}")
         # A margin, object, target, error or measure may be absent at a sample; all else is there or broken.
-        if values and key in ("time", "q", "v", "com") and not np.isfinite(array).all():
-            at = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        if values and key in ("time", "q", "v", "com") and not (np.abs(array) <= MOST).all():
+            at = tuple(int(i) for i in np.argwhere(~(np.abs(array) <= MOST))[0])
             raise BundleError(f"{where}: {key}: expected finite numbers, found {array[at]} at index {at}")
 
 
@@ -167,7 +187,7 @@ class _Field:
             value = float(self.value)
         except (OverflowError, TypeError):  # a whole number of hundreds of digits; a complex number
             value = math.nan
-        if not (math.isfinite(value) and value >= least):
+        if not (abs(value) <= MOST and value >= least):
             raise self.fail("a finite number" + (f" of at least {least:g}" if least > -math.inf else ""))
         return value
 
@@ -211,7 +231,8 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["joint_acceleration"].fail("bounds of at least 0")
     for body in root["bodies"].items() if "bodies" in root else ():
         body["name"].text()
-        body["size"].vector(3)
+        if not (body["size"].vector(3) > 0.0).all():
+            raise body["size"].fail("three lengths above 0")
         body["mass"].number(0.0)
 
 
@@ -250,6 +271,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
+        for key in ("friction", "patch", "squeeze"):
+            if key in item:
+                item[key].number(0.0)
         for pad in item["pads"].items() if "pads" in item else ():
             pad.frame(model)
     for task in phase["tasks"].items():
@@ -259,6 +283,9 @@ def _check_phase(phase: _Field, model: Any) -> None:
     for push in phase["pushes"].items() if "pushes" in phase else ():
         push["frame"].frame(model)
         push["force"].vector(3)
+    for key in ("friction_use", "torque_use"):
+        if key in phase:
+            phase[key].number(0.0)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbplan.bundle import Bundle
-from wbplan.checks import balance, contacts, joints, objects
+from wbplan.checks import balance, contacts, forces, joints, objects
 from wbplan.checks.replay import Replay
 from wbplan.checks.report import CheckReport, Row, Tolerances
 
@@ -48,6 +48,6 @@ def check(
         rows = joints.sampling_rows(bundle)
         if all(row.held for row in rows):  # else nothing more can be computed
             replay = Replay.of(bundle)
-            for rules in (joints.rows, contacts.rows, balance.rows, objects.rows):
+            for rules in (joints.rows, contacts.rows, balance.rows, forces.rows, objects.rows):
                 rows.extend(rules(replay, bounds))
     return CheckReport(tuple(rows))

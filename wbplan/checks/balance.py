@@ -167,7 +167,7 @@ def _pyramids(feet: Array, normals: Array, friction: list[float]) -> tuple[Array
 
 def _stands(rays: Array, moments: Array, com: Array) -> bool:
     """Whether sum f_i = z and sum p_i x f_i = c x z for forces f_i that are sums of the rays."""
-    if not len(rays):
+    if not len(rays) or not np.isfinite(moments).all():  # a foot that is nowhere carries nothing
         return False
     up = np.array([0.0, 0.0, 1.0])
     weight = np.concatenate([up, np.cross([com[0], com[1], 0.0], up)])

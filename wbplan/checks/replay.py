@@ -182,5 +182,6 @@ def _covered(time: Array, phase: Mapping[str, Any]) -> NDArray[np.int64]:
 def _frames(phase: Mapping[str, Any]) -> Iterable[str]:
     yield from (contact["frame"] for contact in phase["contacts"])
     yield from (item["frame"] for item in phase["carried"])
+    yield from (push["frame"] for push in phase.get("pushes", ()))
     for loop in phase["closures"]:
         yield from (loop["frame_a"], loop["frame_b"])

@@ -1,13 +1,17 @@
 """Walking: gaits as data, their margins and speeds, stances, swings, tracks, and phases made of them."""
 
+from wbplan.gaits.building import Manner, Walk, build
+from wbplan.gaits.figures import cycle_figure
 from wbplan.gaits.gait import Gait
+from wbplan.gaits.ground import firm, over
 from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
 from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
+from wbplan.gaits.reach import comfortable, room, roomiest
 from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
 from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.gaits.tracks import Track, arc, on_the_spot, straight, through
-from wbplan.gaits.walking import Manner, Walk, build, walk
+from wbplan.gaits.walking import gait_for, walk
 
 __all__ = [
     "ANT",
@@ -33,20 +37,27 @@ __all__ = [
     "beats_of",
     "best_margin",
     "build",
+    "comfortable",
     "course_of",
     "crawls",
+    "cycle_figure",
     "cycle_margins",
+    "firm",
     "flat",
+    "gait_for",
     "gait_named",
     "gaits_of",
     "mode_named",
     "on_the_spot",
+    "over",
     "pentagon",
     "pentapod",
     "possible",
     "quadrangular",
     "regular_stance",
     "require",
+    "room",
+    "roomiest",
     "schedule",
     "step_margins",
     "straight",

@@ -17,8 +17,8 @@ from wbplan.geometry import HalfPlanes
 
 Array = NDArray[np.float64]
 
-#: Kept beyond the margin asked [m]: the curve is checked at points only.
-SPARE = 5e-4
+#: Kept beyond the margin asked [m], for what ticks are off the curve by.
+SPARE = 1e-3
 #: Spline pieces in a step, and points in each at which the margin is asked for.
 PIECES, POINTS = 4, 4
 
@@ -59,8 +59,8 @@ class Sway:
         return places if self.spline is None else places + self.spline(times)
 
 
-def largest_margins(stays: Sequence[Stay], start: Array, goal: Array) -> tuple[float, Array]:
-    """The largest margin [m] that can be kept all through, and that of each stay with the next one.
+def largest_margin(stays: Sequence[Stay], start: Array, goal: Array) -> float:
+    """The largest margin [m] that can be kept all through.
 
     The supports do not change within a stay: the body may go straight from one boundary to the next, and only
     its places there are to be found (a linear program).
@@ -84,8 +84,13 @@ def largest_margins(stays: Sequence[Stay], start: Array, goal: Array) -> tuple[f
     fixed = {0: start[0], 1: start[1], 2 * count - 2: goal[0], 2 * count - 1: goal[1]}
     bounds = [(fixed[i], fixed[i]) if i in fixed else (None, None) for i in range(2 * count + 1)]
     found = linprog(cost, A_ub=np.vstack(rows), b_ub=np.concatenate(offsets), bounds=bounds)
-    common = [_common(stays[k].polygon, stays[min(k + 1, len(stays) - 1)].polygon) for k in range(len(stays))]
-    return (float(found.x[-1]) if found.x is not None else -np.inf), np.array(common)
+    return float(found.x[-1]) if found.x is not None else -np.inf
+
+
+def common_margins(stays: Sequence[Stay]) -> Array:
+    """The largest margin [m] of a point in each stay's support and the next one's too; the last alone."""
+    nexts = [*stays[1:], stays[-1]]
+    return np.array([_common(a.polygon, b.polygon) for a, b in zip(stays, nexts, strict=True)])
 
 
 def _common(one: HalfPlanes, other: HalfPlanes) -> float:
@@ -139,7 +144,7 @@ def sway(
     spline = BSpline(full, coefficients, 3)
     moved = places + spline(times)
     least = np.concatenate([s.polygon.margins(moved[which == k]) for k, s in enumerate(stays)])
-    return Sway(nominal, spline, _least(least, which)) if least.min() >= margin - SPARE else None
+    return Sway(nominal, spline, _least(least, which)) if least.min() >= margin else None
 
 
 def _points(stays: Sequence[Stay]) -> tuple[Array, NDArray[np.intp]]:

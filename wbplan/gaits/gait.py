@@ -87,6 +87,11 @@ class Gait:
         """Steps in a cycle."""
         return len(self.steps)
 
+    @property
+    def cycle(self) -> float:
+        """Time of a cycle, in times of its longest swing."""
+        return 1.0 / max(t for t, swing in zip(self.lasting, self.steps, strict=True) if swing)
+
     def support(self, step: int) -> tuple[str, ...]:
         """Legs that stand in a step, counted from 0 and past the cycle's end."""
         swing = self.steps[step % len(self.steps)]

@@ -110,7 +110,7 @@ def gaits_of(legs: Legs) -> Mapping[str, Gait]:
         legs: in their order round the body; of six the first three on one side of the line across travel.
     """
     makers: dict[int, list[Callable[[], Sequence[Gait]]]] = {
-        4: [lambda: crawls(legs), lambda: [crawls(legs)[_CRAWL].renamed("crawl")]],
+        4: [lambda: crawls(legs)],
         5: [lambda: list(pentapod(legs).values())],
         6: [
             lambda: [tripod(legs), tripod(legs).renamed("3+3"), pentagon(legs), wave(legs, 5)],
@@ -120,9 +120,6 @@ def gaits_of(legs: Legs) -> Mapping[str, Gait]:
     }
     made = [gait for make in makers.get(len(legs), [lambda: [wave(legs)]]) for gait in make()]
     return MappingProxyType({gait.name: gait for gait in made})
-
-
-_CRAWL = 3
 
 
 def gait_named(name: str, legs: Legs) -> Gait:

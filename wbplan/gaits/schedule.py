@@ -10,7 +10,7 @@ from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PPoly
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 
 from wbplan.errors import SpecError, listing
 from wbplan.gaits.gait import Gait
@@ -102,24 +102,25 @@ class Course:
     way: PPoly
     duration: float
     speed: float
-    _table: tuple[Array, Array] = field(init=False, repr=False)
+    _places: CubicSpline = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        times = np.linspace(0.0, self.duration, max(50, int(100 * self.duration)) + 1)
+        knots = self.way.x
+        times = np.unique(np.concatenate([knots, np.linspace(knots[0], knots[-1], 2 * len(knots))]))
         places = np.array([self.track.place(float(w)) for w in self.way(times)])
-        object.__setattr__(self, "_table", (times, places))
+        object.__setattr__(self, "_places", CubicSpline(times, places, bc_type="clamped"))
 
     def gone(self, t: float) -> float:
         """Way gone at a time [m]."""
         return float(self.way(min(max(t, 0.0), self.duration)))
 
     def place(self, t: float) -> Array:
-        """X [m], y [m], yaw [rad] at a time."""
-        return self.track.place(self.gone(t))
+        """The place x [m], y [m], yaw [rad] at a time."""
+        return np.asarray(self._places(min(max(t, 0.0), self.duration)))
 
     def places(self, times: Array) -> Array:
         """x, y, yaw (N, 3) at times (N,) [s]."""
-        return np.array([self.place(float(t)) for t in times])
+        return np.asarray(self._places(np.clip(times, 0.0, self.duration)))
 
 
 @final
@@ -139,20 +140,19 @@ class Schedule:
 
 
 def beats_of(gait: Gait, count: int, first: int = 0) -> tuple[Beat, ...]:
-    """So many steps of a gait, as beats.
+    """So many steps of a gait, as beats; its longest swing lasts 1.
 
     Args:
         gait: the gait.
         count: of steps.
         first: number of the first one in the cycle.
     """
-    mean = 1.0 / gait.step_count
     found = []
     for k in range(first, first + count):
         share, advance = gait.lasting[k % gait.step_count], gait.advance[k % gait.step_count]
         swing = gait.steps[k % gait.step_count]
         name = f"{gait.name} {' '.join(swing) or 'pause'}"
-        found.append(Beat(swing, lasting=share / mean, pace=advance / share, name=name))
+        found.append(Beat(swing, lasting=share * gait.cycle, pace=advance / share, name=name))
     return tuple(found)
 
 
@@ -167,7 +167,7 @@ def count_for(gait: Gait, distance: float, stride: float) -> int:
     count = gait.step_count
     while True:
         beats = beats_of(gait, count)
-        if beats[-1].swing and distance / _time_at_speed(beats, gait.legs) <= stride / gait.step_count * (
+        if beats[-1].swing and distance / _time_at_speed(beats, gait.legs) <= stride / gait.cycle * (
             1 + 1e-9
         ):
             return count

@@ -41,7 +41,7 @@ class Track:
                 raise SpecError(f"Track.curve({way:g}): expected x, y and yaw, got {place}")
 
     def place(self, way: float) -> Array:
-        """X [m], y [m] and yaw [rad] after `way` [m], held at both ends."""
+        """The place x [m], y [m] and yaw [rad] after `way` [m], held at both ends."""
         return np.asarray(self.curve(min(max(way, 0.0), self.length)), dtype=np.float64)
 
     def pose(self, way: float) -> pin.SE3:

@@ -7,7 +7,17 @@ from collections.abc import Callable, Mapping
 from rich.table import Table
 
 from wbplan.errors import SpecError, listing
-from wbplan.papers import hexpiderix, hiphant, mana, mana_motion, mana_simulated, zheng, zheng_case, zhuang
+from wbplan.papers import (
+    hexpiderix,
+    hiphant,
+    hiphant_motion,
+    mana,
+    mana_motion,
+    mana_simulated,
+    zheng,
+    zheng_case,
+    zhuang,
+)
 from wbplan.papers.rows import DIFFERS, Row
 
 __all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
@@ -16,7 +26,7 @@ PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES + mana_simulated.TABLES,
     "zheng": zheng.TABLES + zheng_case.TABLES,
     "hexpiderix": hexpiderix.TABLES,
-    "hiphant": hiphant.TABLES,
+    "hiphant": hiphant.TABLES + hiphant_motion.TABLES,
     "zhuang": zhuang.TABLES,
 }
 """Paper -> its tables, each a function that computes the rows."""

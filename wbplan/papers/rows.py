@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 REPRODUCED, MISPRINT, FOUND, FASTER, DIFFERS = "reproduced", "misprint", "not printed", "faster", "DIFFERS"
+REACHED, BESIDE = "reached", "beside"
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,8 @@ class Row:
         why: for a misprint what is wrong with it; otherwise a remark.
         misprint: whether the print is expected to be wrong.
         time: whether both are times, of which the shorter is the better.
+        goal: for what depends on a robot that the paper does not give: "least" or "most", where ours has to
+            be at least or at most the printed value, "beside" where it only stands beside it.
     """
 
     paper: str
@@ -35,6 +38,7 @@ class Row:
     why: str = ""
     misprint: bool = False
     time: bool = False
+    goal: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -45,9 +49,11 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """Reproduced, misprint, not printed, faster; DIFFERS where ours is none of these, a fault here."""
+        """How ours stands to the print; DIFFERS where it is none of the ways that count, a fault here."""
         if self.printed is None:
             return FOUND
+        if self.goal:
+            return self._aimed()
         if self.time:
             faster = (
                 not isinstance(self.ours, str)
@@ -58,6 +64,14 @@ class Row:
         if self.misprint:
             return DIFFERS if self.agrees else MISPRINT
         return REPRODUCED if self.agrees else DIFFERS
+
+    def _aimed(self) -> str:
+        if self.goal == "beside":
+            return BESIDE
+        if isinstance(self.ours, str) or isinstance(self.printed, str) or self.printed is None:
+            return DIFFERS
+        better = self.ours - self.printed if self.goal == "least" else self.printed - self.ours
+        return REACHED if better >= 0.0 else DIFFERS
 
     def cells(self) -> tuple[str, str, str, str, str, str, str]:
         """Paper, table, quantity, printed, ours, verdict and remark, as text."""

@@ -27,6 +27,19 @@ def mujoco() -> Any:
         ) from error
 
 
+def compiled(spec: Any) -> Any:
+    """The `MjModel` of a spec.
+
+    Raises:
+        PhysicsError: MuJoCo refuses it.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise PhysicsError(f"MuJoCo cannot simulate this robot or these objects: {said}") from error
+
+
 def version() -> str:
     """MuJoCo's version."""
     return str(mujoco().__version__)

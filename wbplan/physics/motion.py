@@ -34,6 +34,7 @@ class Span:
         pads: the frames that press on it; one where it is not clamped.
         friction: of the pads, where the plan says it.
         holder: the frame that the plan fastens it to.
+        squeeze: [N] of each pad, where the plan says it.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Span:
     pads: tuple[str, ...]
     friction: float | None
     holder: str
+    squeeze: float | None = None
 
 
 @final
@@ -171,7 +173,8 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
                 spans[spans.index(last)] = replace(last, end=end)
             else:
-                spans.append(Span(item["name"], start, end, pads, item.get("friction"), item["frame"]))
+                friction, squeeze = item.get("friction"), item.get("squeeze")
+                spans.append(Span(item["name"], start, end, pads, friction, item["frame"], squeeze))
     return tuple(spans)
 
 
@@ -183,11 +186,13 @@ def grip_of(span: Span, friction: Array, options: Options) -> float:
 
 
 def _squeeze(bundle: Bundle, span: Span, friction: Array, options: Options) -> float:
-    """With n pads, friction alone holds a weight alone where n mu F >= m g; `safety` times that."""
+    """What the plan says; else `safety` times what holds a weight by friction alone: n mu F >= m g."""
     if len(span.pads) < 2 or options.weld:
         return 0.0
     if options.squeeze is not None:
         return options.squeeze
+    if span.squeeze is not None:
+        return span.squeeze
     grip = grip_of(span, friction, options)
     if grip <= 0.0:
         return 0.0
@@ -207,6 +212,11 @@ def _offsets(
     edge = np.diff(record.phase, prepend=record.phase[:1]) != 0
     chosen = np.flatnonzero((np.diff(kept, prepend=-1.0) > 0) | edge | np.append(edge[1:], True))
     effort = np.asarray(model.effortLimit[6:], dtype=np.float64)
+    if not (np.isfinite(effort) & (effort > 0.0)).all():
+        weak = bundle.trajectory.joint_names[int(np.argmin(np.isfinite(effort) & (effort > 0.0)))]
+        raise PhysicsError(
+            f"robot.urdf: joint '{weak}': <limit effort> has to be above 0 for a servo to hold it"
+        )
     torques = np.zeros((len(chosen), len(effort)))
     for row, k in enumerate(chosen):
         phase = bundle.phases[int(record.phase[k])]

@@ -72,8 +72,8 @@ class Options:
             torque / kp; without it the robot sags.
         reserve: share of the feet's friction that the static load may use.
         ground: friction of objects on the ground and on what they stand on.
-        squeeze: force [N] with which each pad presses while something is carried; None takes `safety`
-            times what friction needs to hold the weight.
+        squeeze: force [N] with which each pad presses while something is carried; None takes the plan's, or
+            where it has none `safety` times what friction needs to hold the weight.
         safety: see `squeeze`.
         ramp: seconds over which the squeeze comes before the carrying starts, and goes after it has ended.
         weld: carried objects are fastened to their holders instead of held by friction.

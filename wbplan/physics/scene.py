@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import Bundle
 from wbplan.errors import PhysicsError
 from wbplan.obstacles import Terrain
-from wbplan.physics.engine import keep_movable, mujoco
+from wbplan.physics.engine import compiled, keep_movable, mujoco
 from wbplan.physics.motion import Motion, grip_of
 from wbplan.physics.options import Options
 from wbplan.physics.spec import FLOOR, NOTHING, OBJECT, ROBOT, STAND, robot_spec
@@ -155,20 +155,20 @@ def _set_solver(spec: Any, options: Options) -> None:
 def _tip_shapes(spec: Any, model: Any, tips: Iterable[str]) -> dict[str, list[str]]:
     """For each tip, the shapes fixed to it whose surface passes through its frame's origin."""
     mj = mujoco()
-    compiled = spec.compile()
-    data = mj.MjData(compiled)
-    mj.mj_kinematics(compiled, data)
+    world = compiled(spec)
+    data = mj.MjData(world)
+    mj.mj_kinematics(world, data)
     found: dict[str, list[str]] = {}
     for tip in tips:
-        body = mj.mj_name2id(compiled, mj.mjtObj.mjOBJ_BODY, tip)
+        body = mj.mj_name2id(world, mj.mjtObj.mjOBJ_BODY, tip)
         if body < 0 or not model.existFrame(tip, pin.BODY):
             raise PhysicsError(f"plan.json: '{tip}' is no link of the URDF; only links touch things")
-        origin, group = data.xpos[body], compiled.body_weldid[body]
+        origin, group = data.xpos[body], world.body_weldid[body]
         found[tip] = [
-            compiled.geom(g).name
-            for g in range(compiled.ngeom)
-            if compiled.body_weldid[compiled.geom_bodyid[g]] == group
-            and abs(_distance(compiled, data, g, origin)) < NEAR
+            world.geom(g).name
+            for g in range(world.ngeom)
+            if world.body_weldid[world.geom_bodyid[g]] == group
+            and abs(_distance(world, data, g, origin)) < NEAR
         ]
     return found
 
@@ -276,7 +276,7 @@ def _exclude(spec: Any, one: str, other: str) -> None:
 def _exclude_touching(spec: Any, motion: Motion) -> None:
     """Without an SRDF: links that overlap in the first pose are taken to be made so."""
     mj = mujoco()
-    model = spec.compile()
+    model = compiled(spec)
     data = mj.MjData(model)
     data.qpos[:7] = to_mujoco(motion.base[0])
     for name, value in zip(motion.names, motion.joints[0], strict=True):
@@ -300,7 +300,7 @@ def _compiled(
     floor: float,
 ) -> Scene:
     mj = mujoco()
-    model = spec.compile()
+    model = compiled(spec)
 
     def ids(kind: str, names: Iterable[str]) -> Ids:
         return np.array([getattr(model, kind)(name).id for name in names], dtype=np.int64)

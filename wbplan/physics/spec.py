@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from wbplan.errors import PhysicsError, listing
 from wbplan.physics.engine import add_damping, keep_movable, mujoco
 from wbplan.physics.options import Servo
+from wbplan.robot.reading import is_file
 from wbplan.robot.urdf_links import mesh_places
 
 FLOOR, ROBOT, OBJECT, STAND, NOTHING = 1, 2, 4, 8, 16
@@ -35,6 +36,10 @@ def robot_spec(urdf_text: str, servo: Servo, *, folders: Sequence[Path] = ()) ->
         PhysicsError: MuJoCo refuses the URDF, or a mesh of a collision shape is missing.
     """
     mj = mujoco()
+    try:
+        ElementTree.fromstring(urdf_text.encode())
+    except ElementTree.ParseError as error:  # Pinocchio's parser is less strict
+        raise PhysicsError(f"robot.urdf: not well-formed XML: {error}") from None
     text, assets = _with_meshes(urdf_text, folders)
     spec = _read(text, assets, _STRICT)
     try:
@@ -89,10 +94,11 @@ def _limits(urdf_text: str) -> dict[str, tuple[float, float]]:
     for joint in ElementTree.fromstring(urdf_text.encode()).iter("joint"):
         limit = joint.find("limit")
         if limit is not None:
-            found[joint.get("name", "")] = (
-                float(limit.get("effort", "0")),
-                float(limit.get("velocity", "0")),
-            )
+            try:
+                effort, speed = float(limit.get("effort", "0")), float(limit.get("velocity", "0"))
+            except ValueError as error:
+                raise PhysicsError(f"robot.urdf: joint '{joint.get('name')}': its <limit>: {error}") from None
+            found[joint.get("name", "")] = effort, speed
     return found
 
 
@@ -121,7 +127,7 @@ def _with_meshes(urdf_text: str, folders: Sequence[Path]) -> tuple[str, dict[str
 def _found(name: str, folders: Sequence[Path]) -> Path:
     places = [place for folder in folders for place in mesh_places(name, folder, folders)]
     for place in places:
-        if place.is_file():
+        if is_file(place):
             return place
     looked = listing([str(place) for place in places])
     raise PhysicsError(f"robot.urdf: mesh '{name}' does not exist; looked at {looked}")

@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.errors import SpecError, listing
+from wbplan.robot.reading import is_file
 from wbplan.robot.urdf_links import mesh_places
 from wbplan.state import State, find_frame, find_joint
 
@@ -160,7 +161,7 @@ class Robot:
         """
         places = mesh_places(filename, self.urdf_path.parent, self.package_dirs)
         for place in places:
-            if place.is_file():
+            if is_file(place):
                 return place
         looked = listing([str(place) for place in places])
         raise SpecError(f"robot '{self.name}': mesh '{filename}' does not exist; looked at {looked}")

@@ -15,7 +15,7 @@ import pinocchio as pin
 from wbplan import catalog
 from wbplan.errors import ModelError, SpecError, listing
 from wbplan.robot.description import Robot
-from wbplan.robot.reading import parse_xml, read_text
+from wbplan.robot.reading import is_file, parse_xml, read_text
 from wbplan.robot.srdf import Srdf, Tree, read_srdf
 from wbplan.robot.urdf_check import examine
 from wbplan.state import find_frame
@@ -97,7 +97,7 @@ def _find(name_or_path: str | PathLike[str]) -> Path:
     known = catalog.robots()
     if is_name and text in known:
         return known[text]
-    if is_name and not path.is_file():
+    if is_name and not is_file(path):
         close = difflib.get_close_matches(text, known, n=1)
         hint = f"; did you mean '{close[0]}'?" if close else ""
         raise SpecError(

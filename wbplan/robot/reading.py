@@ -12,7 +12,11 @@ from xml.parsers import expat
 
 from wbplan.errors import ModelError
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+MOST = 1e12
+"""No length, mass, force or speed of a robot comes near this; squares of larger numbers overflow."""
+
+# Other scripts' digits, too, are digits to Python; to the parsers behind Pinocchio they are not.
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class XmlError(ValueError):
@@ -29,7 +33,7 @@ def read_text(path: Path, kind: str) -> str:
     Raises:
         ModelError: there is no such file, it is a folder, or it is not UTF-8 text.
     """
-    if path.is_dir():
+    if is_folder(path):
         inside = sorted(path.glob(f"*.{kind.lower()}"))
         hint = f"; did you mean '{inside[0]}'?" if inside else ""
         raise ModelError(f"{kind} '{path}' is a folder, expected a .{kind.lower()} file{hint}")
@@ -41,6 +45,27 @@ def read_text(path: Path, kind: str) -> str:
         raise ModelError(f"{kind} '{path}' cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise ModelError(f"{kind} '{path}' is not UTF-8 text (byte {error.start})") from None
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is such a folder."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file could have means there is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def brief(text: str, most: int = 80) -> str:
+    """A text for a message, cut off where it is long."""
+    return text if len(text) <= most else f"{text[:most]} ..."
 
 
 def parse_xml(text: str) -> Element:
@@ -135,7 +160,10 @@ class Reader:
             return None
         values = [float(part) if _NUMBER.fullmatch(part) else math.nan for part in parts]
         if len(values) != count or not all(math.isfinite(value) for value in values):
-            self.problem(where, f"{what} is '{text}', expected {expected}")
+            self.problem(where, f"{what} is '{brief(text)}', expected {expected}")
+            return None
+        if max(map(abs, values)) > MOST:
+            self.problem(where, f"{what} is '{brief(text)}', expected nothing beyond {MOST:g}")
             return None
         return tuple(values)
 

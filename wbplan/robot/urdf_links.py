@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from wbplan.robot.reading import Reader
+from wbplan.robot.reading import Reader, is_file
 
 TRIANGLE_TOLERANCE = 1e-3
 """Share of the largest principal moment that the others may lack: a thin plate's, rounded to a few digits."""
@@ -120,7 +120,7 @@ def _check_mesh(
         reader.problem(where, "mesh without a filename")
         return
     places = mesh_places(filename, base_dir, package_dirs)
-    if any(place.is_file() for place in places):
+    if any(is_file(place) for place in places):
         return
     looked = f"; looked at {', '.join(str(place) for place in places)}" if places else ""
     hint = ""

@@ -1,6 +1,9 @@
 """Forces: friction cones, the region where contacts hold the robot, what each contact and servo gives."""
 
 from wbplan.statics.cones import axes_of, faces, friction_use, rays
+from wbplan.statics.forces import ForceQP, grasp_map
+from wbplan.statics.grip import Squeeze, force_closure, smallest_squeeze
+from wbplan.statics.planned import PlanForces, Stance, plan_forces, promised
 from wbplan.statics.region import (
     Region,
     TorqueLimits,
@@ -8,18 +11,30 @@ from wbplan.statics.region import (
     hull_is_exact,
     support_region,
 )
+from wbplan.statics.robust import WrenchCone, tilt
 from wbplan.statics.stance import push_load, support
 
 __all__ = [
+    "ForceQP",
+    "PlanForces",
     "Region",
+    "Squeeze",
+    "Stance",
     "TorqueLimits",
+    "WrenchCone",
     "axes_of",
     "equilibrium_region",
     "faces",
+    "force_closure",
     "friction_use",
+    "grasp_map",
     "hull_is_exact",
+    "plan_forces",
+    "promised",
     "push_load",
     "rays",
+    "smallest_squeeze",
     "support",
     "support_region",
+    "tilt",
 ]

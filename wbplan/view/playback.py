@@ -315,7 +315,7 @@ class _Playback:
 
     def _camera(self, boxes: Sequence[Array]) -> None:
         # Where it faces is told by the robot at the start: later it may have turned or walked past the boxes.
-        start = self.corners[: len(self.figure.links) * 8]
+        start = self.corners[: max(1, len(self.figure.links) * 8)]
         front = facing(start, boxes, None)
         if not boxes:
             path = self.trajectory.q[-1, :2] - self.trajectory.q[0, :2]

@@ -14,6 +14,7 @@ import yourdfpy
 from numpy.typing import NDArray
 
 from wbplan.errors import ModelError, ViewError
+from wbplan.robot.reading import is_file
 from wbplan.robot.urdf_links import mesh_places
 
 Array = NDArray[np.float64]
@@ -127,7 +128,7 @@ def _triangles(geometry: Any, link: str, folders: Sequence[Path]) -> list[Any]:
 
 def _loaded(mesh: Any, link: str, folders: Sequence[Path]) -> list[Any]:
     places = [place for folder in folders for place in mesh_places(mesh.filename, folder, folders[1:])]
-    path = next((place for place in places if place.is_file()), None)
+    path = next((place for place in places if is_file(place)), None)
     if path is None:
         looked = ", ".join(dict.fromkeys(str(place) for place in places)) or "no folder"
         raise ViewError(

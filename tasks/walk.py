@@ -1,0 +1,76 @@
+"""Walking: any robot with legs, in any gait and direction, straight, along an arc or on the spot.
+
+The body keeps moving at the gait's speed from when every foot has stepped once until they take their last
+steps; feet land where they work evenly ahead of their stance and behind it.
+
+Source: Zhuang, Gao, Deng, "Gait planning research for an electrically driven large-load-ratio six-legged
+robot", 2017 (gaits, walking modes); Zheng, Xu, Tian, Ding, "Different manipulation mode analysis of a radial
+symmetrical hexapod robot with leg-arm integration", 2022 (gaits on five legs).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import wbplan as wb
+
+ROBOT = "heavy_hexapod"
+ROBOTS = "any"
+
+
+def script(
+    robot: wb.Robot,
+    *,
+    gait: str = "",
+    mode: Literal["free", "crab", "ant", "mixed1", "mixed2"] = "free",
+    path: Literal["straight", "arc", "spot"] = "straight",
+    distance: float | None = None,
+    cycles: float = 2.0,
+    heading: float = 0.0,
+    turn: float = 0.0,
+    stroke: float | None = None,
+    step_time: float | None = None,
+    lift: float | None = None,
+    height: float | None = None,
+    radius: float | None = None,
+    margin: float | None = None,
+    friction: float = 0.7,
+) -> wb.Script:
+    """A walk.
+
+    Args:
+        robot: with three legs or more.
+        gait: its name; 'tripod' of six legs, 'crawl' of four, 'wave' of others where not given.
+        mode: which way the legs point and the robot goes: crab and mixed1 along x, ant and mixed2 along y;
+            'free' leaves the legs as in the robot's pose 'stand'.
+        path: a straight line, an arc that the body follows, or a turn on the spot.
+        distance: [m]; as many cycles as `cycles` says where not given.
+        cycles: see `distance`.
+        heading: of travel, against the mode's direction [degrees].
+        turn: of the body by the end of the path [degrees].
+        stroke: how far a foot goes in the body's frame while it stands [m]; six tenths of what they can where
+            not given, and half the body's height at most.
+        step_time: of a step [s]; as short as joints' speeds allow where not given.
+        lift: how high feet rise [m]; a tenth of the body's height where not given.
+        height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
+        radius: of the circle that the feet stand on [m]; the pose's stance where not given.
+        margin: stability margin kept throughout [m]; 0.6 of the largest where not given.
+        friction: of the feet on the ground [-].
+    """
+    walker = wb.gaits.Walker(robot)
+    way = wb.gaits.mode_named(mode)
+    stance = walker.stance(lean=way.lean, radius=radius, height=height)
+    rise = 0.1 * stance.height if lift is None else lift
+    stance, easy = wb.gaits.comfortable(walker, stance, rise, adjust=height is None)
+    stroke = easy if stroke is None else stroke
+    course = way.heading + math.radians(heading)
+    made = wb.gaits.gait_for(walker, gait, stance, course, stroke)
+    length = cycles * made.stride(stroke) if distance is None else distance
+    if path == "spot":
+        track = wb.gaits.on_the_spot(math.radians(turn) or length / stance.radius, stance.radius)
+    else:
+        bend = wb.gaits.straight if path == "straight" else wb.gaits.arc
+        track = bend(length, turn=math.radians(turn), heading=course)
+    manner = wb.gaits.Manner(step_time=step_time, height=rise, margin=margin, friction=friction)
+    return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner).script

@@ -1,0 +1,66 @@
+"""A short run of the soak, and proof that its watch sees what is broken."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from soak_run import soak
+from soak_watch import Watch
+
+import wbplan as wb
+
+
+def test_some_thousand_ticks_keep_every_promise() -> None:
+    report = soak(4000, seed=1)
+    assert not report.found, report.table()
+    assert report.total.ticks >= 4000
+    assert {"ticks proxqp", "ticks placo"} <= set(report.total.counts)
+    assert all(share <= 1.0 for share in report.total.worst.values()), report.table()
+
+
+@pytest.fixture(scope="module")
+def standing() -> tuple[wb.Robot, wb.Phase, wb.State]:
+    robot = wb.load_robot("mana")
+    limits = [wb.JointLimits(), wb.SupportPolygon(margin=0.01)]
+    phase = wb.Phase("stand", contacts=[wb.Contact(f) for f in robot.feet.values()], limits=limits)
+    return robot, phase, robot.state("stand")
+
+
+def _tick(state: wb.State, q: np.ndarray, dt: float, **more: object) -> SimpleNamespace:
+    import pinocchio as pin
+
+    v = pin.difference(state.model, state.q, q) / dt
+    return SimpleNamespace(q=q, v=v, t=dt, com=wb.State(state.model, q).com, margin=np.nan, **more)
+
+
+@pytest.mark.parametrize(
+    ("index", "by", "promise"),
+    [
+        (0, 2e-4, "slip"),
+        (0, 0.5, "margin:"),
+        (8, 4.0, "position"),
+        (8, 0.5, "speed"),
+        (1, np.nan, "not finite"),
+    ],
+)
+def test_the_watch_sees_a_broken_promise(
+    standing: tuple[wb.Robot, wb.Phase, wb.State], index: int, by: float, promise: str
+) -> None:
+    robot, phase, state = standing
+    watch = Watch(robot, phase, state.q, 0.01, {})
+    q = np.array(state.q)
+    q[index] += by
+    tick = _tick(state, q, 0.01) if np.isfinite(by) else SimpleNamespace(q=q, v=q, t=0.0, com=q[:3])
+    assert any(promise in what for what in watch.see(tick))
+
+
+def test_the_watch_is_content_with_a_robot_that_stands(
+    standing: tuple[wb.Robot, wb.Phase, wb.State],
+) -> None:
+    robot, phase, state = standing
+    loop = wb.Loop(robot, phase, state, dt=0.01)
+    watch = Watch(robot, phase, state.q, 0.01, {})
+    for _ in range(3):
+        assert watch.see(loop.step()) == []

@@ -1,0 +1,70 @@
+"""Ground to walk on: heights of a terrain, and footholds that lie firmly on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbplan.errors import GaitError
+from wbplan.gaits.schedule import Ground
+from wbplan.obstacles import Terrain
+from wbplan.paths import number
+
+Array = NDArray[np.float64]
+#: A limb and its foothold (3,) [m] -> a better one.
+Place = Callable[[str, Array], Array]
+
+#: Directions in which the ground round a foothold is looked at, and in which a better one is looked for.
+ROUND = 8
+#: Places looked at in each direction.
+RINGS = 12
+
+
+def over(terrain: Terrain, floor: float = 0.0) -> Ground:
+    """Height of a terrain, and of the floor where it has nothing.
+
+    Args:
+        terrain: obstacles seen from above.
+        floor: [m].
+    """
+
+    def height(x: float, y: float) -> float:
+        found = float(terrain.height(x, y))
+        return found if np.isfinite(found) else floor
+
+    return height
+
+
+def firm(ground: Ground, radius: float, reach: float, rise: float = 0.005) -> Place:
+    """Moves footholds away from edges: to the nearest place where the ground is even all round the foot.
+
+    Args:
+        ground: its height.
+        radius: of the foot [m].
+        reach: how far a foothold may be moved [m].
+        rise: by how much the ground under a foot may differ from the height at its middle [m].
+
+    Returns:
+        A limb and its foothold -> a better one; raises `GaitError` where there is none.
+    """
+    radius = number(radius, "firm: radius", "a length of 0 or more [m]", least=0.0)
+    reach = number(reach, "firm: reach", "a length of 0 or more [m]", least=0.0)
+    angles = 2.0 * np.pi * np.arange(ROUND) / ROUND
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    shifts = [np.zeros(2), *(r * d for r in reach * np.arange(1, RINGS + 1) / RINGS for d in circle)]
+
+    def place(limb: str, foot: Array) -> Array:
+        for shift in shifts:
+            x, y = foot[:2] + shift
+            z = ground(float(x), float(y))
+            rim = (np.array([x, y]) + radius * circle).tolist()
+            if all(abs(ground(a, b) - z) <= rise for a, b in rim):
+                return np.array([x, y, z])
+        raise GaitError(
+            f"'{limb}': no firm foothold within {reach:.3f} m of ({foot[0]:.3f}, {foot[1]:.3f}) m: the "
+            f"ground differs by more than {rise:.3f} m under a foot of {radius:.3f} m everywhere"
+        )
+
+    return place

@@ -1,0 +1,166 @@
+"""What legs can do: joints along a walk in closed form, and how long a stroke a stance has room for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbplan.errors import GaitError
+from wbplan.gaits.schedule import Step
+from wbplan.gaits.stance import Stance, Walker
+from wbplan.gaits.swing import QuinticSwing
+
+Array = NDArray[np.float64]
+
+#: Moments looked at in a step.
+MOMENTS = 7
+
+
+@final
+@dataclass(frozen=True)
+class Fastest:
+    """The joint that comes nearest to its speed limit, or goes furthest beyond.
+
+    Attributes:
+        share: of its limit.
+        joint: its name.
+        step: where.
+    """
+
+    share: float
+    joint: str
+    step: str
+
+
+def follow(
+    walker: Walker,
+    steps: Sequence[Step],
+    swings: Sequence[Mapping[str, Any]],
+    body: Callable[[Array], tuple[Array, Array]],
+) -> Fastest:
+    """Joints of all legs along a walk, by closed forms.
+
+    Args:
+        walker: the legs.
+        steps: in order.
+        swings: of each step, limb -> path of its foot.
+        body: times (N,) [s] -> places of the body (N, 3) [m] and yaws (N,) [rad].
+
+    Raises:
+        GaitError: a leg cannot reach its foothold, or its place in the air.
+    """
+    model, worst = walker.robot.model, Fastest(0.0, "", "")
+    last = {leg: _joints(walker, leg, walker.state.q) for leg in walker.closed}
+    limits = {
+        leg: np.array([model.velocityLimit[walker.robot.joint_index(j)[1]] for j in form.joints])
+        for leg, form in walker.closed.items()
+    }
+    for k, (step, paths) in enumerate(zip(steps, swings, strict=True)):
+        times = np.linspace(0.0, step.duration, MOMENTS)
+        places, yaws = body(step.begin + times)
+        flying = {limb: path.points(times) for limb, path in paths.items()}
+        for m, (place, yaw) in enumerate(zip(places, yaws, strict=True)):
+            c, s = np.cos(yaw), np.sin(yaw)
+            turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+            for leg, form in walker.closed.items():
+                foot = flying[leg][m] if leg in flying else step.support.get(leg)
+                if foot is None:
+                    continue
+                found = form.solve(turn @ (foot - place))
+                if not found.within:
+                    what = "its place in the air" if leg in flying and 0 < m < MOMENTS - 1 else "its foothold"
+                    raise GaitError(
+                        f"step '{step.name}', at {step.begin + times[m]:.2f} s: '{leg}' cannot reach {what}: "
+                        f"{found.reason}",
+                        step=max(k - 1, 0),
+                    )
+                joints = found.nearest(last[leg]).joints
+                if m:
+                    shares = np.abs(joints - last[leg]) / (times[1] * limits[leg])
+                    fast = int(shares.argmax())
+                    if shares[fast] > worst.share:
+                        worst = Fastest(float(shares[fast]), form.joints[fast], step.name)
+                last[leg] = joints
+    return worst
+
+
+def _joints(walker: Walker, leg: str, q: Array) -> Array:
+    return np.array([q[walker.robot.joint_index(joint)[0]] for joint in walker.closed[leg].joints])
+
+
+def room(walker: Walker, stance: Stance, lift: float, heading: float | None = None) -> float:
+    """The longest stroke [m] that every leg can make about its stance, on the ground and lifted in between.
+
+    Args:
+        walker: the legs.
+        stance: of the feet.
+        lift: height of the swing [m].
+        heading: of the stroke in the body [rad]; of any where not given.
+    """
+    headings = [heading] if heading is not None else list(np.arange(4) * np.pi / 4.0)
+    least = 2.0 * stance.height
+    for leg, foot in stance.feet.items():
+        if leg not in walker.closed:
+            continue
+        for angle in headings:
+            ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+            least = min(
+                least, _stroke(walker.closed[leg], np.array([*foot, -stance.height]), ahead, lift, least)
+            )
+    return least
+
+
+def _stroke(leg: Any, foot: Array, ahead: Array, lift: float, most: float) -> float:
+    """The longest stroke of one leg in one direction, `most` [m] at most, by bisection."""
+    times = np.linspace(0.0, 1.0, 17)
+
+    def fits(stroke: float) -> bool:
+        half = 0.5 * stroke * ahead
+        # At duty factor 1/2 the foot goes two strokes while the body goes one: it first falls behind.
+        air = QuinticSwing(foot - half, foot + 3.0 * half, lift, 1.0).points(times)
+        air -= 2.0 * times[:, None] * half
+        ground = foot + np.linspace(-1.0, 1.0, 3)[:, None] * half
+        return all(leg.reachable(place) for place in (*ground, *air))
+
+    if fits(most):
+        return most
+    low, high = 0.0, most
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low
+
+
+def roomiest(walker: Walker, stance: Stance, lift: float) -> Stance:
+    """The stance at the body height, from 0.8 to 1.3 of its own, that leaves most room for strokes.
+
+    Args:
+        walker: the legs.
+        stance: of the feet.
+        lift: height of the swing [m].
+    """
+    heights = stance.height * np.arange(0.8, 1.31, 0.05)
+    found = [(room(walker, Stance(stance.feet, float(h)), lift), float(h)) for h in heights]
+    return Stance(stance.feet, max(found)[1])
+
+
+def comfortable(walker: Walker, stance: Stance, lift: float, *, adjust: bool = True) -> tuple[Stance, float]:
+    """A stance and a stroke [m] that legs make with ease.
+
+    The stroke is six tenths of the room that there is, and half the body's height at most.
+
+    Args:
+        walker: the legs.
+        stance: of the feet.
+        lift: height of the swing [m].
+        adjust: the body may be higher or lower where legs have next to no room at the stance.
+    """
+    stroke = room(walker, stance, lift)
+    if adjust and stroke < 0.1 * stance.height:
+        stance = roomiest(walker, stance, lift)
+        stroke = room(walker, stance, lift)
+    return stance, min(0.6 * stroke, 0.5 * stance.height)
