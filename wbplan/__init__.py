@@ -37,6 +37,7 @@ from wbplan.tasks import (
 )
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION as __version__
+from wbplan.why import Reason, Why
 
 __all__ = [
     "AS_IS",
@@ -78,6 +79,7 @@ __all__ = [
     "PositionTask",
     "PostureTask",
     "Push",
+    "Reason",
     "RelativePoseTask",
     "Relaxation",
     "Robot",
@@ -96,6 +98,7 @@ __all__ = [
     "ViewError",
     "Waypoints",
     "WbplanError",
+    "Why",
     "__version__",
     "check",
     "gaits",

@@ -39,6 +39,8 @@ robot manipulators", 2018, for one joint by itself; the common M is for joints t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, final
 
 import numpy as np
@@ -48,6 +50,9 @@ from numpy.typing import NDArray
 from wbplan.compiled import CompiledPhase
 
 Array = NDArray[np.float64]
+
+#: What a tick knows of those before it: two steps, ticks before rest, braking, the step of the CoM.
+Pace = tuple[Array, Array, float, Array, Array]
 
 #: Share of the acceleration by which joints slow in each of the M ticks; at a limit they use twice of it.
 BRAKING = 0.45
@@ -217,7 +222,7 @@ class JointBox:
     Attributes:
         lower, upper: (nf,) bounds on the step of the free columns; the base, first, has none.
         q_index: (n,) where the free joints are in q.
-        previous, older: (n,) the last step and the one before it.
+        previous, older: (n,) the last step and the one before it; com_step: (3,) the CoM's last step [m].
         left: ticks before the robot is to be at rest, this one included.
         reach, most: (n,) how far the speed limits let the joints go in a tick, and how much further or less
             far than in the last one.
@@ -231,8 +236,9 @@ class JointBox:
         self.lower, self.upper = np.full(6 + n, -UNBOUNDED), np.full(6 + n, UNBOUNDED)
         self.q_index = joints + 1
         self.previous, self.older, self.left = np.zeros(n), np.zeros(n), NEVER
+        self.com_step = np.zeros(3)
         self.ticks, self.factor = 1.0, 0.0
-        self.reach, self.most = np.full((2, n), UNBOUNDED)
+        self.reach, self.most, self.slowing, self._jerk = np.full((4, n), UNBOUNDED)
         self._limited, self._jerky = limits is not None, False
         if limits is None:
             return
@@ -278,10 +284,40 @@ class JointBox:
                 self.lower, self.upper,
             )  # fmt: skip
 
-    def took(self, step: Array) -> None:
-        """The free joints went on by a step (n,)."""
+    @contextmanager
+    def relaxed(self, column: int, kind: str, by: float, *, up: bool) -> Iterator[None]:
+        """With one limit of a joint wider by so much [rad, m, per s, ...], until the block ends."""
+        names = ("_q_lower", "_q_upper", "reach", "most", "slowing", "_jerk")
+        kept, j = {name: getattr(self, name) for name in names}, column - 6
+        for name in names:
+            setattr(self, name, kept[name].copy())
+        if kind == "speed":
+            self.reach[j] += by * self.dt
+        elif kind == "acceleration":
+            self.most[j] += by * self.dt**2
+            self.slowing[j] += BRAKING * by * self.dt**2
+        elif kind == "jerk":
+            self._jerk[j] += by * self.dt**3
+        elif up:
+            self._q_upper[j] += by
+        else:
+            self._q_lower[j] -= by
+        yield
+        for name in names:
+            setattr(self, name, kept[name])
+
+    def took(self, step: Array, com_step: Array) -> None:
+        """The free joints went on by a step (n,), the CoM by (3,) [m]."""
         self.older[:] = self.previous
-        self.previous[:] = step
+        self.previous[:], self.com_step[:] = step, com_step
+
+    def keep_pace(self) -> Pace:
+        """What this tick knows of those before it, for `put_pace`."""
+        return self.previous.copy(), self.older.copy(), self.left, self.slowing, self.com_step.copy()
+
+    def put_pace(self, pace: Pace) -> None:
+        """Know of the ticks before what was kept."""
+        self.previous[:], self.older[:], self.left, self.slowing, self.com_step[:] = pace
 
     def history(self) -> tuple[Array, Array, float]:
         """What `kind` has to know of this tick, kept."""

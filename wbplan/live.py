@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbplan import reasons
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.tick import Loop
@@ -42,13 +43,16 @@ class LiveView:
         self._bodies: dict[str, Array] = {
             body.name: pin.SE3ToXYZQUAT(body.pose) for body in script.bodies if body.pose is not None
         }
-        self._next = 0.0
+        self._next, self._next_word, self._why = 0.0, 0.0, ""
 
     def __call__(self, loop: Loop, t: float) -> None:
         """Draws the loop as it is at time `t` [s] of the plan, `EVERY` so often."""
         if t < self._next:
             return
         self._next = t + EVERY
+        if t >= self._next_word and loop.last is not None:
+            self._next_word, why = t + reasons.EVERY, reasons.worst(loop.last, loop)
+            self._why = "" if why is None else f"\n{why}"
         compiled, stack = loop.compiled, loop.stack
         phase, polygon, margin = compiled.phase, compiled.polygon, compiled.margin
         self._bodies.update(loop.bodies())
@@ -65,5 +69,5 @@ class LiveView:
             required=margin or 0.0,
             bodies=self._bodies,
             targets=loop.targets(),
-            label=f"{phase.name}\nt = {t:.1f} s",
+            label=f"{phase.name}\nt = {t:.1f} s{self._why}",
         )

@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, final
@@ -21,11 +21,13 @@ from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.paths import number
+from wbplan.reasons import why_at
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
 from wbplan.script import Phase, Script
 from wbplan.state import State
 from wbplan.tick import Loop
+from wbplan.why import Why
 
 if TYPE_CHECKING:
     from wbplan.physics import Simulation
@@ -45,10 +47,12 @@ class Plan:
     Attributes:
         robot: the robot.
         bundle: everything that is saved, as data.
+        loops: start [s] and loop of every phase, for `why`; empty for a plan that was read from files.
     """
 
     robot: Robot
     bundle: Bundle
+    loops: tuple[tuple[float, Loop], ...] = field(default=(), repr=False)
 
     @property
     def report(self) -> Mapping[str, Any]:
@@ -60,6 +64,21 @@ class Plan:
     def trajectory(self) -> Trajectory:
         """Time, q, v and the rest, as arrays."""
         return self.bundle.trajectory
+
+    def why(self, t: float, task: str, part: str | None = None) -> Why:
+        """What holds a task back at a time of the plan, and what letting go of each would give.
+
+        Args:
+            t: time [s] of the plan.
+            task: label of a task of the phase then, or its frame where only one task is on it.
+            part: 'position', 'orientation' or 'joints'; by default the one that is off most.
+
+        Raises:
+            SpecError: there is no such time, task or part, or the plan was not made in this process.
+        """
+        if not self.loops:
+            raise SpecError("Plan.why: the plan has no phases to ask, only what was recorded of them")
+        return why_at(self.loops, self.trajectory, t, task, part)
 
     def check(self) -> CheckReport:
         """Every promise recomputed from q, the URDF and the phases' specifications."""
@@ -150,7 +169,7 @@ def plan(
     placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
     started = time.perf_counter()
-    recorder = Recorder(robot, script, dt)
+    recorder, loops = Recorder(robot, script, dt), []
     lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
     done = 0  # ticks
     for phase in script.phases:
@@ -163,6 +182,7 @@ def plan(
         )  # fmt: skip
         _promises_hold(loop, phase)
         recorder.begin(index, loop, placed, done * dt)
+        loops.append((done * dt, loop))
         for k in range(ticks):
             if observe is not None:
                 observe(loop, (done + k) * dt)
@@ -183,7 +203,7 @@ def plan(
     if progress is not None:
         progress(1.0, "done")
     bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
-    return Plan(robot, bundle)
+    return Plan(robot, bundle, tuple(loops))
 
 
 def _compile_kernels(

@@ -35,10 +35,12 @@ class LevelSolution:
     Attributes:
         x: (nf,) the step over the free columns with this level and those above.
         multipliers: of this level's own program.
+        stiffness: (nf, nf) what kept it from bending the levels above, beside its own H; None for nothing.
     """
 
     x: Array
     multipliers: Multipliers
+    stiffness: Array | None = None
 
 
 @final

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
 from wbplan.compiled import CompiledPhase
 from wbplan.obstacles import to_record
+from wbplan.reasons import Notes
 from wbplan.robot import Robot
 from wbplan.script import Script
 from wbplan.statics import Stance, plan_forces, promised
@@ -46,6 +47,7 @@ class Recorder:
         self._placed: Mapping[str, Any] = {}
         self._stances: list[Stance] = []
         self._start = 0.0
+        self._notes = Notes(script.duration)
 
     def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
         """A phase starts: what was the last sample of the one before becomes the first of this one."""
@@ -73,6 +75,7 @@ class Recorder:
         if tick.warning:
             self._warnings.append(f"{loop.compiled.phase.name}: {tick.warning}")
         self._sample(self._index, loop)
+        self._notes.take(loop, tick, len(self._v) * self._dt)
 
     def _sample(self, index: int, loop: Loop) -> None:
         stack = loop.stack
@@ -188,6 +191,7 @@ class Recorder:
             "joint_acceleration": np.max([p["joint_acceleration"] for p in self._phases], axis=0).tolist(),
             "obstacles": [to_record(item) for item in self._script.obstacles],
             "phases": self._phases,
+            "why": self._notes.found,
             "report": report,
         }
         return Bundle(plan, trajectory, self._robot.urdf_text)

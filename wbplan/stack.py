@@ -63,7 +63,7 @@ class Stack:
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
         easing: how much less careful this tick is than it should be, see `ease`.
-        com_step: (3,) how far the CoM went in the last tick; closer: (E,) how far it may go to each edge [m].
+        closer: (E,) [m] by how much nearer the CoM may come to each edge.
         ascents: manipulability tasks.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
@@ -175,7 +175,7 @@ class Stack:
         self.blocks: list[RowBlock] = []
         if edges:
             self.blocks.append(RowBlock("margin", "m", slice(0, edges), lambda: self.edge_names))
-        self.closer, self.com_step = np.zeros(edges), np.zeros(3)
+        self.closer = np.zeros(edges)
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -251,16 +251,15 @@ class Stack:
         return gaps
 
     def fill_box(self) -> None:
-        """Fill lower and upper, and how much nearer the CoM may come to each edge, for this configuration."""
+        """Fill lower, upper and closer for this configuration."""
         support, box = self.phase.phase.support, self.box
         if support is None:
             box.fill(self.kinematics.q, self.closer, self.closer, self.easing)
             return
         inside = self.distances() - (support.margin + MARGIN_RESERVE)
-        closing = self.normals @ self.com_step[:2]
+        closing = self.normals @ self.box.com_step[:2]
         box.fill(self.kinematics.q, inside, closing, self.easing)
-        back = support.recovery_speed * self.dt
-        ramp = back * self.dt / RECOVERY
+        back, ramp = support.recovery_speed * self.dt, support.recovery_speed * self.dt**2 / RECOVERY
         kernels.approach(inside, closing, box.ticks, box.factor, back, ramp, self.easing, self.closer)
 
     def ease(self) -> bool:
@@ -274,20 +273,14 @@ class Stack:
         self.easing += 1
         self.fill_box()
         self._fill_polygon(self.closer)
-        if self.easing == 3:
-            self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard]
+        self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard] * (self.easing == 3)
         return True
 
     def begin(self, step: Array) -> None:
-        """Start after a step (nv,) [m, rad]."""
+        """Start after a step (nv,) [m, rad], and the same before it."""
         self.kinematics.differentiate()
-        self.took(step, self.kinematics.com_jacobian @ step)
-        self.box.older[:] = self.box.previous
-
-    def took(self, step: Array, com_step: Array) -> None:
-        """The robot went on by a step (nv,), its CoM by (3,) [m]."""
-        self.com_step[:] = com_step
-        self.box.took(step[self.free[6:]])
+        for _ in range(2):
+            self.box.took(step[self.free[6:]], self.kinematics.com_jacobian @ step)
 
     def soft_damping(self) -> float:
         """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
@@ -312,10 +305,17 @@ class Stack:
             self._fill_polygon(np.maximum(inside, 0.0) if recovering else inside)
         self.driven_step[:] = given
 
-    @property
-    def reaches(self) -> Array:
-        """(nf - 6,) how far [m or rad] the speed limit lets each free joint move in one tick."""
-        return self.box.reach
+    def box_kind(self, column: int, *, up: bool) -> str:
+        """What makes a free column's bound: 'position', 'speed', 'acceleration' or 'jerk'."""
+        return self.box.kind(column, float((self.upper if up else self.lower)[column]), self.box.history())
+
+    def relaxed_box(self, column: int, kind: str, by: float, *, up: bool) -> tuple[Array, Array]:
+        """Lower and upper as they would be were a limit of one joint wider by so much [rad, m, or per s]."""
+        with self.box.relaxed(column, kind, by, up=up):
+            self.fill_box()
+            moved = self.lower.copy(), self.upper.copy()
+        self.fill_box()
+        return moved
 
     # -- names -------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, final
 
 import numpy as np
@@ -20,16 +20,19 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.active import Active, HeldBack
-from wbplan.backends import make_backend
+from wbplan.backends import Backend, make_backend
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.joint_box import Pace
 from wbplan.paths import number, vector
+from wbplan.qp import Solution
 from wbplan.retract import DRIFT, Retraction
 from wbplan.robot import Robot
 from wbplan.script import Phase
 from wbplan.stack import Stack
 from wbplan.state import State
+from wbplan.why import Why, active_sets, explain, keep_goals, put_goals
 
 Array = NDArray[np.float64]
 
@@ -54,6 +57,7 @@ class Tick:
         "_errors",
         "_held_back",
         "_measures",
+        "_replay",
         "com",
         "margin",
         "microseconds",
@@ -63,12 +67,15 @@ class Tick:
         "warning",
     )
 
-    def __init__(self, loop: Loop, v: Array, held_back: HeldBack, started: float) -> None:
+    def __init__(
+        self, loop: Loop, v: Array, held_back: HeldBack, replay: partial[Why], started: float
+    ) -> None:
         stack = loop.stack
         self.t, self.q, self.v = loop.t, loop.q, v
         self.com, self.margin = stack.kinematics.com.copy(), stack.margin
         self._errors, self._held_back = stack.keep_errors(), held_back
         self._measures = stack.keep_measures()
+        self._replay = replay
         promised = loop.compiled.margin
         self.warning = ""
         if promised is not None and self.margin < promised - 1e-6:
@@ -96,6 +103,18 @@ class Tick:
         """Limits and hard rows that held the robot back in this step, the strongest first."""
         return self._held_back.named()
 
+    def why(self, task: str, part: str | None = None) -> Why:
+        """What holds a task back in this step, and what letting go of each would give.
+
+        Args:
+            task: its label, or its frame where only one task is on it.
+            part: 'position', 'orientation' or 'joints'; by default the one that is off most.
+
+        Raises:
+            SpecError: there is no such task or part.
+        """
+        return self._replay(task, part)
+
 
 @final
 class Loop:
@@ -115,6 +134,7 @@ class Loop:
 
     Attributes:
         velocity: (nv,) of the last step [m/s, rad/s].
+        last: the last tick made; None before the first.
 
     Raises:
         SpecError: the phase does not fit the robot, or not how it moves when the phase begins.
@@ -145,6 +165,8 @@ class Loop:
         self.stack.measure(self.q)
         self._backend = make_backend(backend, self.stack)
         self._retraction = Retraction(self.stack)
+        self.last: Tick | None = None
+        self._second: tuple[Stack, Backend | None] | None = None
         self._begin(velocity, rest_at, braking)
 
     def _begin(self, velocity: Array | None, rest_at: float | None, braking: Array | None) -> None:
@@ -184,6 +206,12 @@ class Loop:
         places = self.stack.kinematics.data.oMf
         return {h.body.name: pin.SE3ToXYZQUAT(places[h.frame]) for h in self.compiled.held}
 
+    def put(self, q: Array, t: float) -> None:
+        """Go on from configuration `q` (nq,) at time `t` [s] of the phase."""
+        self.q, self.t = np.array(q), number(t, "Loop.put: t", "a finite time in seconds")
+        self.stack.aim(self.t)
+        self.stack.measure(self.q)
+
     def step(self, t: float | None = None) -> Tick:
         """Move on by one tick, from time `t` [s] of the phase (by default where the last one ended).
 
@@ -192,7 +220,7 @@ class Loop:
             SpecError: a path's value is not finite, or not of its kind. The loop's state is unchanged.
         """
         started = time.perf_counter()
-        stack, q = self.stack, self.q
+        stack, q, began = self.stack, self.q, self.t if t is None else t
         if t is not None and t != self.t:
             self.t = number(t, "Loop.step: t", "a finite time in seconds")
             stack.aim(self.t)
@@ -214,10 +242,33 @@ class Loop:
             raise
         self.q, self.t = new, ends
         taken = pin.difference(self.compiled.model, q, new)
+        replay = partial(self._why, q, began, keep_goals(stack), stack.box.keep_pace(), solution)
         held_back = HeldBack(stack, solution)
         self.velocity = taken / self.dt
-        stack.took(taken, stack.kinematics.com - com)
-        return Tick(self, self.velocity, held_back, started)
+        stack.box.took(taken[stack.free[6:]], stack.kinematics.com - com)
+        self.last = Tick(self, self.velocity, held_back, replay, started)
+        return self.last
+
+    def _why(
+        self, q: Array, t: float, goals: tuple[Array, ...], pace: Pace, solution: Solution, task: str,
+        part: str | None,
+    ) -> Why:  # fmt: skip
+        """A tick again, on a stack of its own: the loop has moved on."""
+        if self._second is None:
+            stack = Stack(self.compiled, self.dt)
+            self._second = stack, make_backend(self._backend.name, stack) if solution.multipliers else None
+        stack, backend = self._second
+        stack.aim(t)
+        put_goals(stack, goals)
+        stack.measure(q)
+        stack.box.put_pace(pace)
+        stack.advance(t)
+        put_goals(stack, goals)
+        if backend is None:
+            stack.assemble()
+        else:
+            solution = backend.solve()
+        return explain(stack, active_sets(stack, solution), task, part)
 
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""

@@ -10,6 +10,8 @@ from wbplan.errors import SpecError
 from wbplan.qp import Backend
 from wbplan.stack import Stack
 
+__all__ = ["BACKENDS", "Backend", "make_backend"]
+
 BACKENDS: dict[str, Callable[[Stack], Backend]] = {"proxqp": ProxqpBackend, "placo": PlacoBackend}
 
 

@@ -12,7 +12,7 @@ order where that level is held back (see `curvature`); elsewhere it is zero. z =
 lower level cannot fail.
 
 N comes from a rank-revealing QR factorisation; redundant rows cost nothing, and a row direction that is
-shorter than `DEPENDENT` counts as free.
+shorter than `nullspace.DEPENDENT` counts as free.
 """
 
 from __future__ import annotations
@@ -28,14 +28,11 @@ from scipy.linalg import lapack
 from wbplan.backends.curvature import Curvature
 from wbplan.backends.kkt import ROUNDING
 from wbplan.levels import Level
+from wbplan.nullspace import null_basis
 from wbplan.qp import LevelSolution, Multipliers
 from wbplan.stack import REGULARISATION, Stack
 
 Array = NDArray[np.float64]
-
-#: Rows [m/rad, rad/rad] whose part that is not in the rows before is shorter than this do not bind levels
-#: below: these may move them by so much per radian of their own motion, 1e-9 m in a tick of 0.1 rad.
-DEPENDENT = 1e-8
 
 #: How much more a lower level pays for the second-order cost of a level above than that level itself would.
 HELD = 1e6
@@ -161,6 +158,7 @@ class Cascade:
         self._sides = [np.zeros(rows, dtype=np.int64) for _ in stack.levels[1:]]
         self._above = [level.postured for level in stack.levels[:-1]]
         self._curvature = Curvature(stack)
+        self._reaches = stack.box.reach
         self._gz, self._low, self._high = np.zeros(n), np.zeros(rows), np.zeros(rows)
         self._Hz, self._G = np.zeros(n * n), np.zeros(rows * n)
 
@@ -179,8 +177,9 @@ class Cascade:
             if bent is not None:
                 B = bent if B is None else B + bent
             N = self._free_of(N, stack.levels[k].rows, self._above[k])
-            x, multipliers = self._solve_level(k, level.H, level.g, x, N, B)
-            found.append(LevelSolution(x, multipliers))
+            solution = self._solve_level(k, level.H, level.g, x, N, B)
+            found.append(solution)
+            x, multipliers = solution.x, solution.multipliers
         return tuple(found)
 
     def _free_of(self, N: Array | None, rows: Array, joints: NDArray[np.intp]) -> Array:
@@ -223,7 +222,7 @@ class Cascade:
     def _beyond(self, k: int, level: Level, left: Array, x: Array, multipliers: Multipliers) -> Array:
         """(s,) the part of what is left undone that no step of `STEP` or less can mend."""
         stack = self._stack
-        short_of_speed = np.abs(x[6:]) < (1.0 - 1e-9) * stack.reaches
+        short_of_speed = np.abs(x[6:]) < (1.0 - 1e-9) * self._reaches
         short_of_speed &= np.abs(x[6:] - stack.box.previous) < (1.0 - 1e-9) * stack.box.most
         stopped = 6 + np.flatnonzero((np.abs(multipliers.box[6:]) > ROUNDING) & short_of_speed)
         above = [self._rows_of(j) for j in range(k)]
@@ -240,23 +239,24 @@ class Cascade:
         """All that the k-th level holds: its rows, then its posture joints."""
         return np.vstack([self._stack.levels[k].rows, np.eye(len(self._stack.g))[self._above[k]]])
 
-    def _solve_level(
-        self, k: int, H: Array, g: Array, x: Array, N: Array, B: Array | None
-    ) -> tuple[Array, Multipliers]:
+    def _solve_level(self, k: int, H: Array, g: Array, x: Array, N: Array, B: Array | None) -> LevelSolution:
         s, n, p = self._stack, len(x), N.shape[1]
         rows = len(self._low)
         found = Multipliers(np.zeros(len(s.b)), np.zeros(len(s.d)), np.zeros(n))
         if p == 0:
-            return x, found
+            return LevelSolution(x, found)
         gz, Hz = self._gz[:p], self._Hz[: p * p].reshape(p, p)
         G = self._G[: rows * p].reshape(rows, p)
         _reduce(H, g, x, N, s.C, s.d, s.lower, s.upper, Hz, gz, G, self._low, self._high)
+        stiffness: Array | None = None
         if B is not None:
             values, vectors = np.linalg.eigh(N.T @ B @ N)
-            Hz += (vectors * (HELD * np.maximum(values, 0.0))) @ vectors.T
+            held = (vectors * (HELD * np.maximum(values, 0.0))) @ vectors.T
+            Hz += held
+            stiffness = N @ held @ N.T
         z, force = self._guess(k, gz, Hz, G) or self._ask_solver(k, gz, Hz, G)
         found.box[6:], found.rows[:] = force[: n - 6], force[n - 6 :]
-        return x + N @ z, found
+        return LevelSolution(x + N @ z, found, stiffness)
 
     def _guess(self, k: int, gz: Array, Hz: Array, G: Array) -> tuple[Array, Array] | None:
         """By linear solves from last tick's active bounds, if a few lead to the solution."""
@@ -285,18 +285,3 @@ class Cascade:
         force = np.array(qp.results.z)
         np.sign(np.where(np.abs(force) > ROUNDING, force, 0.0), out=self._sides[k], casting="unsafe")
         return np.array(qp.results.x), force
-
-
-def null_basis(rows: Array) -> Array:
-    """(n, p) orthonormal basis of the steps that move none of the rows (m, n)."""
-    m, n = rows.shape
-    if m == 0:
-        return np.eye(n)
-    factor, _, tau, _, _ = lapack.dgeqp3(rows.T)
-    rank = int(np.count_nonzero(np.abs(np.diagonal(factor)) > DEPENDENT))
-    if rank == 0:
-        return np.eye(n)
-    square = np.zeros((n, n), order="F")
-    square[:, :rank] = factor[:, :rank]
-    full, _, _ = lapack.dorgqr(square, np.concatenate([tau[:rank], np.zeros(n - rank)]), overwrite_a=True)
-    return np.ascontiguousarray(full[:, rank:])

@@ -221,6 +221,10 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["dt"].fail("a number above 0")
     if not isinstance(root["report"].value, Mapping):
         raise root["report"].fail("an object")
+    for note in root["why"].items() if "why" in root else ():
+        if not isinstance(note.value, Mapping):
+            raise note.fail("an object")
+        note["time"].number(), note["until"].number(), note["text"].text()
     standing = {item.name for item in obstacles_of(plan, where)}
     for phase in root["phases"].items(least=1):
         _check_phase(phase, model)

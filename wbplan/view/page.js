@@ -80,12 +80,13 @@ function write(element, text) { if (element.textContent !== text) element.textCo
 function tell(t) {
   const overlay = node("overlay");
   if (overlay.story && overlay.story !== story) begin(overlay.story);
-  const [title, detail] = byId("label").children;
+  const [title, detail, why] = byId("label").children;
   if (!story) {
     show("label", !overlay.label);
-    const [first, ...rest] = (overlay.label || "").split("\n");
+    const [first, second, ...rest] = (overlay.label || "").split("\n");
     write(title, first);
-    write(detail, rest.join(" "));
+    write(detail, second || "");
+    write(why, rest.join(" "));
     return;
   }
   const i = Math.max(0, upTo(story.starts, t));
@@ -95,6 +96,8 @@ function tell(t) {
   write(detail, `${story.title}  ·  phase ${i + 1} of ${story.names.length}` +
     (Number.isFinite(margin) ? `  ·  margin ${(1000 * margin).toFixed(0)} mm` : "") +
     (story.asked[i] > -1e8 ? `, at least ${(1000 * story.asked[i]).toFixed(0)}` : ""));
+  const note = (story.why || []).find(([from, until]) => from - 1e-6 <= t && t < until);
+  write(why, note ? note[2] : "");
   write(byId("clock"), `${t.toFixed(2)} / ${story.duration.toFixed(1)} s`);
   byId("knob").style.left = `${100 * t / story.duration}%`;
   const marks = byId("phases").children;

@@ -323,7 +323,8 @@ class _Playback:
         self.draw_in.frame_view(np.vstack([self.corners, *boxes]), front)
 
     def _story(self) -> None:
-        starts = [float(phase["start"]) - float(self.trajectory.time[0]) for phase in self.phases]
+        first = float(self.trajectory.time[0])
+        starts = [float(phase["start"]) - first for phase in self.phases]
         story = {
             "title": _title_of(self.plan),
             "duration": self.duration,
@@ -332,6 +333,10 @@ class _Playback:
             "times": floats(self.time),
             "margins": floats(self.trajectory.margin[self.picked]),
             "asked": [float(phase["margin"]) for phase in self.phases],
+            "why": [
+                [float(note["time"]) - first, float(note["until"]) - first, str(note["text"])]
+                for note in self.plan.get("why", ())
+            ],
         }
         self.draw_in.tell("/wbplan/overlay", "story", story)
 
