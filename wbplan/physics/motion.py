@@ -48,6 +48,24 @@ class Span:
 
 @final
 @dataclass(frozen=True, eq=False)
+class Pressing:
+    """A stretch of time in which a frame pushes on what is around, without a break.
+
+    Attributes:
+        frame: its name.
+        force: (3,) [N], world, of the robot.
+        start: [s].
+        end: [s].
+    """
+
+    frame: str
+    force: Array
+    start: float
+    end: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
 class Motion:
     """The plan as the simulator needs it; N samples, J joints in Pinocchio's order, C feet.
 
@@ -65,6 +83,7 @@ class Motion:
         phase: (N,) and `phases`: their names.
         spans: when objects are carried.
         squeeze: force [N] of each pad, by object.
+        pushing: frames that ever push on what is around.
         objects: name -> (N, 7) planned poses.
         margin: (N,) [m], planned.
     """
@@ -83,6 +102,7 @@ class Motion:
     phases: tuple[str, ...]
     spans: tuple[Span, ...]
     squeeze: Mapping[str, float]
+    pushing: tuple[str, ...]
     objects: Mapping[str, Array]
     margin: Array
 
@@ -139,7 +159,8 @@ def motion_of(bundle: Bundle, options: Options) -> Motion:
         time=time, base=np.array(record.q[:, :7]), joints=joints, offsets=offsets,
         names=tuple(record.joint_names), feet=feet, places=places, touching=touching, friction=friction,
         normals=normals, phase=np.asarray(record.phase), phases=tuple(p["name"] for p in bundle.phases),
-        spans=spans, squeeze=squeeze, objects=held, margin=np.asarray(record.margin),
+        spans=spans, squeeze=squeeze, pushing=tuple(dict.fromkeys(p.frame for p in _pressings(bundle))),
+        objects=held, margin=np.asarray(record.margin),
     )  # fmt: skip
 
 
@@ -176,6 +197,22 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
                 friction, squeeze = item.get("friction"), item.get("squeeze")
                 spans.append(Span(item["name"], start, end, pads, friction, item["frame"], squeeze))
     return tuple(spans)
+
+
+def _pressings(bundle: Bundle) -> tuple[Pressing, ...]:
+    """Phases that push alike, one after the other, push without a break."""
+    found: list[Pressing] = []
+    origin = float(bundle.trajectory.time[0])
+    for phase in bundle.phases:
+        for item in phase.get("pushes", ()):
+            force = np.array(item["force"], dtype=np.float64)
+            start, end = float(phase["start"]) - origin, float(phase["end"]) - origin
+            last = next((p for p in reversed(found) if p.frame == item["frame"]), None)
+            if last is not None and abs(last.end - start) < 1e-6 and np.array_equal(last.force, force):
+                found[found.index(last)] = replace(last, end=end)
+            else:
+                found.append(Pressing(item["frame"], force, start, end))
+    return tuple(found)
 
 
 def grip_of(span: Span, friction: Array, options: Options) -> float:
@@ -221,6 +258,10 @@ def _offsets(
     for row, k in enumerate(chosen):
         phase = bundle.phases[int(record.phase[k])]
         loads = [load for span in spans for load in _pad_loads(bundle, span, squeeze[span.name], k, options)]
+        loads += [
+            (model.getFrameId(p.frame), -_risen(float(time[k]), p, options.ramp) * p.force)
+            for p in _pressings(bundle)
+        ]
         feet = [model.getFrameId(c["frame"]) for c in phase["contacts"]]
         friction = options.reserve * np.array([c["friction"] for c in phase["contacts"]])
         if options.lead:
@@ -231,6 +272,14 @@ def _offsets(
     full = np.column_stack([np.interp(time, time[chosen], column) for column in torques.T])
     offsets: Array = faded(full, time) / _gains(model, options)
     return offsets
+
+
+def _risen(t: float, pressing: Pressing, ramp: float) -> float:
+    """Share of a push: it rises from its start on, and is gone at its end."""
+    ramp = min(ramp, 0.5 * (pressing.end - pressing.start))
+    knots = [pressing.start, pressing.start + ramp, pressing.end - ramp, pressing.end]
+    share = float(np.interp(t, knots, [0.0, 1.0, 1.0, 0.0]))
+    return share * share * (3.0 - 2.0 * share)
 
 
 def _pad_loads(bundle: Bundle, span: Span, force: float, k: int, options: Options) -> list[tuple[int, Array]]:

@@ -40,6 +40,7 @@ class Record:
         feet: (K, C, 3) [m], the feet's frames.
         objects: name -> (K, 7) x y z qw qx qy qz.
         pads: frame -> (K,) [N], normal force on objects.
+        pushed: frame that pushes on what is around -> (K,) [N], normal force there.
         grounded: name -> (K,), the object touches ground or stand.
         collision: (K,) [N], the largest force between two links.
         stray: (K,), something of the robot that is no foot touches the ground.
@@ -58,6 +59,7 @@ class Record:
     feet: Array
     objects: dict[str, Array]
     pads: dict[str, Array]
+    pushed: dict[str, Array]
     grounded: dict[str, Bools]
     collision: Array
     stray: Bools
@@ -92,6 +94,7 @@ class _Run:
         self.slide, self.feet = np.zeros((K, C, 3)), np.zeros((K, C, 3))
         self.objects = {name: np.zeros((K, 7)) for name in scene.objects}
         self.pads = {pad: np.zeros(K) for pad in scene.pad_geoms}
+        self.pushed = {frame: np.zeros(K) for frame in scene.push_geoms}
         self.grounded = {name: np.zeros(K, dtype=bool) for name in scene.objects}
         self.collision, self.stray = np.zeros(K), np.zeros(K, dtype=bool)
         self.clash, self.strayed, self.hardest = "", "", 0.0
@@ -101,6 +104,7 @@ class _Run:
         for i, geoms in enumerate(scene.foot_geoms):
             self.foot_of[geoms] = i
         self.pad_of = {int(g): pad for pad, geoms in scene.pad_geoms.items() for g in geoms}
+        self.pusher_of = {int(g): frame for frame, geoms in scene.push_geoms.items() for g in geoms}
         self.object_of = {
             int(g): name
             for name, (body, _) in scene.objects.items()
@@ -219,6 +223,8 @@ class _Run:
                     self.force[k, foot] += upward[c] * (felt_force @ axes[c].reshape(3, 3))
                     if loads[c] > LOADED:
                         self.slide[k, foot] = sliding[c]
+                elif int(own[c]) in self.pusher_of:
+                    self.pushed[self.pusher_of[int(own[c])]][k] += loads[c]
                 elif loads[c] > LOADED:
                     self.stray[k] = True
                     self.strayed = self.strayed or self._link(own[c])
@@ -277,6 +283,7 @@ class _Run:
             force=self.force[:last], slide=self.slide[:last], feet=self.feet[:last],
             objects={name: poses[:last] for name, poses in self.objects.items()},
             pads={name: force[:last] for name, force in self.pads.items()},
+            pushed={name: force[:last] for name, force in self.pushed.items()},
             grounded={name: on[:last] for name, on in self.grounded.items()},
             collision=self.collision[:last], stray=self.stray[:last], links=(self.clash, self.strayed),
             finished=last == self.steps,

@@ -41,6 +41,7 @@ class Scene:
         foot_geoms: for each of the motion's feet, its shapes.
         foot_bodies: for each foot, the body of its frame.
         pad_geoms: frame -> its shapes.
+        push_geoms: frame that pushes on what is around -> its shapes.
         objects: name -> (body, where its pose is in qpos).
         kind: (G,) collision bits of every shape: 1 ground, 2 robot, 4 object, 8 stand.
         pins: for each foot, the number of its ball joint to the ground, or -1.
@@ -56,6 +57,7 @@ class Scene:
     foot_geoms: tuple[Ids, ...]
     foot_bodies: Ids
     pad_geoms: Mapping[str, Ids]
+    push_geoms: Mapping[str, Ids]
     objects: Mapping[str, tuple[int, int]]
     kind: Ids
     pins: Ids
@@ -111,7 +113,8 @@ def scene_of(
     mj = mujoco()
     spec = robot_spec(bundle.urdf, options.servo, folders=folders)
     _set_solver(spec, options)
-    tips = list(dict.fromkeys([*motion.feet, *(pad for span in motion.spans for pad in span.pads)]))
+    pads = [pad for span in motion.spans for pad in span.pads]
+    tips = list(dict.fromkeys([*motion.feet, *pads, *motion.pushing]))
     shapes = _tip_shapes(spec, bundle.model, tips)
     for foot in motion.feet:
         if not shapes[foot]:
@@ -319,6 +322,7 @@ def _compiled(
         foot_geoms=tuple(tips[foot] for foot in motion.feet),
         foot_bodies=ids("body", motion.feet),
         pad_geoms={pad: tips[pad] for span in motion.spans for pad in span.pads},
+        push_geoms={frame: tips[frame] for frame in motion.pushing},
         objects={
             name: (model.body(name).id, int(model.jnt_qposadr[model.joint(name).id]))
             for name in motion.objects

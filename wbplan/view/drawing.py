@@ -131,6 +131,18 @@ class Drawing:
         self.put(f"{path}/off", off)
         return path
 
+    def force(self, name: str) -> str:
+        """Draws the arrow of a planned force, of length 1; returns its node."""
+        path = node("planned_forces", name)
+        self.put(path, shapes.arrow(0.006 * self.unit, shapes.PLANNED))
+        return path
+
+    def cone(self, name: str, normal: ArrayLike, friction: float, height: float) -> str:
+        """Draws a friction cone with its tip at the node; returns the node."""
+        path = node("cones", name)
+        self.put(path, shapes.cone(normal, friction, height, shapes.PLANNED))
+        return path
+
     def support(self, name: str, polygon: ArrayLike, inset: ArrayLike | None, z: float = 0.0) -> str:
         """Draws a support polygon (V, 2) at a height [m], and in it the region where the margin is kept."""
         path = node("support", name)

@@ -17,6 +17,7 @@ from wbplan.geometry import support_polygon
 from wbplan.view import shapes
 from wbplan.view.drawing import DISC_Z, GRADES, Drawing, body_sizes, box_corners, grade, node, pose7
 from wbplan.view.figure import Figure
+from wbplan.view.forces import draw_forces
 from wbplan.view.ghost import Ghost, draw_ghost
 from wbplan.view.keys import FINE, apart, changes, pick, quaternions
 from wbplan.view.messages import SetAnimation, Store, Track, Window, floats
@@ -184,6 +185,7 @@ class _Playback:
         self.phase: NDArray[np.int64] = np.clip(self.trajectory.phase[self.picked], 0, len(self.phases) - 1)
         self.duration = max(float(self.time[-1]), 1e-3)
         self.feet = list(dict.fromkeys(c["frame"] for phase in self.phases for c in phase["contacts"]))
+        self.pushing = list(self.trajectory.forces)
         # A closure may also name a carried body, which the robot's model does not have.
         self.tips = [name for name in dict.fromkeys(_holding(self.phases)) if self.figure.has(name)]
         self.tracks: list[Track] = []
@@ -196,6 +198,7 @@ class _Playback:
         self._support()
         self._com()
         self._obstacles()
+        self._forces()
         boxes = self._bodies()
         self._targets()
         self._trails()
@@ -207,7 +210,7 @@ class _Playback:
 
     def _kinematics(self) -> None:
         """Poses (N, L, 4, 4) of links, places (N, 3) of tips, and corners of the space that is taken."""
-        frames = list(dict.fromkeys([*self.feet, *self.tips]))
+        frames = list(dict.fromkeys([*self.feet, *self.tips, *self.pushing]))
         poses, places, corners = [], [], []
         every = max(1, len(self.picked) // 24)
         for i, k in enumerate(self.picked):
@@ -280,6 +283,14 @@ class _Playback:
             if not is_grid(item):
                 there = np.array([item.name in phase.get("obstacles", ()) for phase in self.phases])
                 self._visible(self.draw_in.obstacle(item), there[self.phase])
+
+    def _forces(self) -> None:
+        """Planned forces on the robot, and the friction cones that those of the feet have to be in."""
+        forces = {name: force[self.picked] for name, force in self.trajectory.forces.items()}
+        tracks, shown = draw_forces(forces, self.places, self.phases, self.phase, self.time, self.draw_in)
+        self.tracks += tracks
+        for path, now in shown:
+            self._visible(path, now)
 
     def _bodies(self) -> list[Array]:
         """Draws the bodies; returns corners (8, 3) of each where it first and last is."""

@@ -18,7 +18,7 @@ BACKGROUND = (0.933, 0.945, 0.957)
 GREEN, AMBER, RED = 0x2A9D5C, 0xF0A020, 0xD8342C
 TOUCHING, LIFTED = 0x12836F, 0x9AA6B2
 SUPPORT = 0x2F74B5
-GHOST, FORCE = 0x3A7BD5, 0xC2417C
+GHOST, FORCE, PLANNED = 0x3A7BD5, 0xC2417C, 0x7A4FC0
 WOOD, WOOD_EDGE = 0xC99A5B, 0x6E4B22
 TRAILS = (0xC2417C, 0x7A4FC0, 0xD9772B, 0x2A8FA8, 0x6B8E23, 0x8C6D5A, 0x4C6FBF, 0x9C4F4F)
 #: The red, green and blue of a frame's x, y and z axes.
@@ -56,10 +56,21 @@ def ghost(mesh: LinkMesh) -> Any:
     return mc.Mesh(geometry, mc.MeshLambertMaterial(color=GHOST, opacity=0.35, transparent=True))
 
 
-def arrow(radius: float) -> Any:
+def arrow(radius: float, colour: Colour = FORCE) -> Any:
     """An arrow from the origin to (0, 0, 1)."""
     vertices, faces = _spike(np.zeros(3), np.array([0.0, 0.0, 1.0]), radius, pointed=True)
-    return mc.Mesh(mc.TriangularMeshGeometry(vertices, faces), flat(FORCE, 0.9))
+    return mc.Mesh(mc.TriangularMeshGeometry(vertices, faces), flat(colour, 0.9))
+
+
+def cone(normal: ArrayLike, friction: float, height: float, colour: Colour) -> Any:
+    """A friction cone: its tip at the origin, open along the normal, its slant side a height [m] long."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+    ring = np.column_stack([friction * np.cos(turn), friction * np.sin(turn), np.ones(24)])
+    ring = ring @ _upright(normal).T * (height / np.hypot(1.0, friction))
+    i = np.arange(24)
+    sides = np.column_stack([np.full(24, 24), i, (i + 1) % 24])
+    vertices = np.vstack([ring, np.zeros((1, 3))])
+    return mc.Mesh(mc.TriangularMeshGeometry(vertices, sides), flat(colour, 0.16))
 
 
 def sphere(radius: float, colour: Colour) -> Any:
