@@ -20,6 +20,7 @@ from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.fallback import Retries
 from wbplan.paths import number
 from wbplan.reasons import why_at
 from wbplan.recorder import Recorder
@@ -56,7 +57,10 @@ class Plan:
 
     @property
     def report(self) -> Mapping[str, Any]:
-        """Seconds of planning and motion, ticks, their median and p99 [us], worst errors, warnings."""
+        """Seconds of planning and motion, ticks, their median and p99 [us], worst errors, warnings, retries.
+
+        `incomplete` says why a plan ends early: only `SolveError.partial` has it.
+        """
         report: Mapping[str, Any] = self.bundle.plan["report"]
         return report
 
@@ -156,7 +160,8 @@ def plan(
     Raises:
         SpecError: the script does not fit the robot, the start is outside the joint limits, or a phase
             promises what its start does not hold.
-        SolveError: a tick has no step that keeps every hard promise.
+        SolveError: a tick has no step that keeps every hard promise, or neither backend finds it; the error's
+            `partial` is the plan until then.
     """
     script = script if isinstance(script, Script) else Script(script)
     dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
@@ -169,7 +174,17 @@ def plan(
     placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
     started = time.perf_counter()
-    recorder, loops = Recorder(robot, script, dt), []
+    recorder, retries = Recorder(robot, script, dt), Retries()
+    loops: list[tuple[float, Loop]] = []
+
+    def planned(incomplete: str = "") -> Plan:
+        seconds = time.perf_counter() - started
+        told = {"retries": retries.made, **({"incomplete": incomplete} if incomplete else {})}
+        found = recorder.bundle(task, backend, dict(parameters or {}), seconds, retries.warnings())
+        report = {**found.plan["report"], **told}
+        whole = Bundle({**found.plan, "report": report}, found.trajectory, found.urdf)
+        return Plan(robot, whole, tuple(loops))
+
     lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
     done = 0  # ticks
     for phase in script.phases:
@@ -189,10 +204,13 @@ def plan(
             if progress is not None and k % 20 == 0:
                 progress((done + k) / sum(lengths), phase.name)
             try:
-                tick = loop.step()
+                tick = retries.step(loop, (done + k) * dt)
             except SolveError as error:
-                where = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into"
-                raise SolveError(f"{where} {error}", error.clashes, error.limits) from None
+                said = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into {error}"
+                kept = None
+                with contextlib.suppress(WbplanError):  # forces that nobody can give: then nothing is kept
+                    kept = planned(said) if recorder.cut(index, loop, (done + k) * dt) else None
+                raise SolveError(said, error.clashes, error.limits, kept) from None
             recorder.record(loop, tick)
         done += ticks
         q, roles, velocity = loop.q, loop.compiled.roles, loop.velocity
@@ -202,8 +220,7 @@ def plan(
         observe(loop, done * dt)
     if progress is not None:
         progress(1.0, "done")
-    bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
-    return Plan(robot, bundle, tuple(loops))
+    return planned()
 
 
 def _compile_kernels(

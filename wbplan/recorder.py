@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -48,12 +48,7 @@ class Recorder:
         self._stances: list[Stance] = []
         self._start = 0.0
         self._notes = Notes(script.duration)
-
-    def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
-        """A phase starts: what was the last sample of the one before becomes the first of this one."""
-        self._placed = {name: pin.SE3ToXYZQUAT(pose) for name, pose in placed.items()}
-        self._start = elapsed
-        for samples in (
+        self._samples: tuple[list[Any], ...] = (
             self._q,
             self._com,
             self._margin,
@@ -62,11 +57,27 @@ class Recorder:
             self._measures,
             self._targets,
             self._bodies,
-        ):
-            if samples:
-                samples.pop()
+        )
+        self._edge: list[Any] = []
+
+    def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
+        """A phase starts: what was the last sample of the one before becomes the first of this one."""
+        self._placed = {name: pin.SE3ToXYZQUAT(pose) for name, pose in placed.items()}
+        self._start = elapsed
+        self._edge = [samples.pop() for samples in self._samples if samples]
         self._sample(index, loop)
         self._index = index
+
+    def cut(self, index: int, loop: Loop, elapsed: float) -> bool:
+        """A phase breaks off at time `elapsed` [s]; False where nothing moved before that."""
+        if not self._v:
+            return False
+        if self._phase.count(index) > 1:
+            self.end(index, loop, elapsed)
+        else:  # it never moved: the edge's sample goes back to the phase before
+            for samples, last in zip(self._samples, self._edge, strict=True):
+                samples[-1] = last
+        return True
 
     def record(self, loop: Loop, tick: Tick) -> None:
         """One tick was made."""
@@ -138,7 +149,14 @@ class Recorder:
             }
         )
 
-    def bundle(self, task: str, backend: str, parameters: dict[str, Any], seconds: float) -> Bundle:
+    def bundle(
+        self,
+        task: str,
+        backend: str,
+        parameters: dict[str, Any],
+        seconds: float,
+        warnings: Sequence[str] = (),
+    ) -> Bundle:
         """Everything recorded, as a bundle."""
         n = len(self._q)
         margin = np.array(self._margin)
@@ -177,7 +195,7 @@ class Recorder:
             "median_us": float(np.median(microseconds)),
             "p99_us": float(np.percentile(microseconds, 99)),
             "worst": dict(self._worst),
-            "warnings": list(dict.fromkeys(self._warnings)),
+            "warnings": list(dict.fromkeys([*self._warnings, *warnings])),
         }
         plan = {
             "schema": SCHEMA,

@@ -180,6 +180,22 @@ class Loop:
             self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
 
     @property
+    def backend(self) -> str:
+        """Name of the backend that solves."""
+        return self._backend.name
+
+    def restart(self, backend: str | None = None) -> None:
+        """Go on from here with a new solver, which remembers nothing of the ticks before.
+
+        Args:
+            backend: 'proxqp' or 'placo'; by default the same as before.
+
+        Raises:
+            SpecError: there is no such backend, or it cannot express the phase.
+        """
+        self._backend = make_backend(backend or self.backend, self.stack)
+
+    @property
     def margin(self) -> float:
         """Stability margin now [m]."""
         return self.stack.margin
@@ -234,7 +250,7 @@ class Loop:
             stack.box.left = max(1.0, round((self._rest_at - self.t) / self.dt))
         try:
             stack.advance(self.t)
-            solution = self._backend.solve()
+            solution = self._solve()
             new = self._keep(q, solution.step, before)
         except WbplanError:
             stack.aim(self.t)
@@ -269,6 +285,15 @@ class Loop:
         else:
             solution = backend.solve()
         return explain(stack, active_sets(stack, solution), task, part)
+
+    def _solve(self) -> Solution:
+        """What the backend finds; whatever its library throws is a `SolveError`."""
+        try:
+            return self._backend.solve()
+        except (RuntimeError, ArithmeticError, ValueError) as error:
+            said = " ".join(str(error).split())[:200]
+            name = self.compiled.phase.name
+            raise SolveError(f"phase '{name}': the solver of '{self.backend}' failed: {said}") from error
 
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""

@@ -49,6 +49,7 @@ LAYERS = [
     "retract",
     "backends",
     "tick",
+    "fallback",
     "bundle",
     "checks",
     "plots",

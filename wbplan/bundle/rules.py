@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbplan.bundle.urdf import require_readable
 from wbplan.errors import BundleError, SpecError, listing
 from wbplan.obstacles import Obstacle, from_record
 
@@ -50,6 +51,7 @@ def model_of(urdf: str, where: str) -> Any:
     Raises:
         BundleError: Pinocchio cannot build it.
     """
+    require_readable(urdf, where)
     try:
         return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError, TypeError) as error:
@@ -146,6 +148,14 @@ def _difference(found: Sequence[str], expected: Sequence[str]) -> str:
 # --------------------------------------------------------------------------------------------- plan.json
 
 
+def _sayable(text: str) -> bool:
+    """Whether a text can be written: JSON also takes halves of characters."""
+    try:
+        return bool(text.encode("utf-8")) or not text
+    except UnicodeEncodeError:
+        return False
+
+
 @dataclass(frozen=True)
 class _Field:
     """A JSON value and where it stands; its methods return it as what it has to be, or refuse it."""
@@ -176,7 +186,7 @@ class _Field:
         return (_Field(item, f"{self.where}[{i}]") for i, item in enumerate(self.value))
 
     def text(self) -> str:
-        if not isinstance(self.value, str):
+        if not isinstance(self.value, str) or not _sayable(self.value):
             raise self.fail("text")
         return self.value
 
