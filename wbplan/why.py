@@ -207,7 +207,9 @@ def _reasons(stack: Stack, held: tuple[Held, ...], found: Slopes, label: str) ->
     for k, (name, kind, unit) in enumerate(stack.row_names()):
         if name and found.rows[k]:
             one = "mm" if unit == "m" else "deg"
-            yield Reason(name, kind, one, -found.rows[k] * UNITS[one])
+            # The CoM slows down before an edge: a tick may take only this share of what is left.
+            share = 2.0 / (stack.box.ticks + 1.0) if kind == "margin" and stack.easing == 0 else 1.0
+            yield Reason(name, kind, one, -share * found.rows[k] * UNITS[one])
     groups: dict[tuple[str, str, str], list[float]] = {}
     for (name, unit), slope in zip(stack.hard_names(), found.hard, strict=True):
         kind = "contact" if name.startswith("contact(") else "hard"

@@ -122,7 +122,7 @@ class ProxqpBackend:
         qp = self._qp = self._new_solver()
         self._started = False  # the next tick begins anew: this solver's patience is not for every tick
         qp.settings.max_iter = 1000
-        qp.settings.eps_primal_inf = 1e-12
+        qp.settings.eps_primal_inf = INFEASIBLE
         self._scale = max(1.0, float(np.abs(s.g).max()) / LARGE, float(np.abs(s.H).max()) / LARGE)
         H, g = s.H / self._scale, s.g / self._scale
         qp.init(H, g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
