@@ -5,7 +5,7 @@ Nothing here is a matrix: both backends start from this.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wbplan.acceleration import acceleration_bounds, braking_bounds, jerk_bounds
 from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
-from wbplan.bodies import Held, frame_number, with_carried
+from wbplan.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
 from wbplan.objectives import BalanceTask, ManipulabilityTask
@@ -99,8 +99,8 @@ class CompiledPhase:
             in one plane and nothing pushes.
         ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
-        acceleration: (n,) bounds of the n actuated joints [rad/s^2, m/s^2]; braking: what of it they count on
-            for braking; jerk: (n,) [rad/s^3, m/s^3] or None.
+        acceleration, braking, jerk: (n,) bounds of all joints, see `wbplan.acceleration`; no jerk is None.
+        standing: bodies that stand in the world and are not carried, each with its pose.
     """
 
     robot: Robot
@@ -122,6 +122,7 @@ class CompiledPhase:
     braking: Array
     jerk: Array | None
     ascents: tuple[AscentTarget, ...] = ()
+    standing: tuple[tuple[Body, Any], ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -135,6 +136,7 @@ def compile_phase(
     q: Array,
     placed: Mapping[str, Any] | None = None,
     roles: Mapping[str, str | None] | None = None,
+    bodies: Sequence[Body] = (),
 ) -> CompiledPhase:
     """Look up every name of a phase and bind its targets to a start configuration.
 
@@ -144,6 +146,7 @@ def compile_phase(
         q: (nq,) configuration at the phase's start.
         placed: pose in the world of every body that stands somewhere, by name.
         roles: the role that each limb is in; by default read off `q`.
+        bodies: the script's; those in `placed` that are not carried stand in the way.
 
     Raises:
         SpecError: a name does not exist, or two parts of the phase do not fit.
@@ -202,6 +205,7 @@ def compile_phase(
         braking_bounds(robot, phase, acceleration),
         jerk_bounds(robot, phase),
         tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
+        standing(phase.carried, placed or {}, bodies),
     )
 
 

@@ -86,7 +86,7 @@ class Plan:
 
     def check(self) -> CheckReport:
         """Every promise recomputed from q, the URDF and the phases' specifications."""
-        return check(self.bundle)
+        return check(self.bundle, folders=self._folders)
 
     def save(self, folder: str | Path) -> Path:
         """Write the bundle, with its animation and plots, whole or not at all.
@@ -192,8 +192,9 @@ def plan(
             raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
         loop = Loop(
-            robot, phase, q, dt, backend=backend, placed=placed, roles=roles, velocity=velocity,
-            rest_at=(sum(lengths) - done) * dt, braking=_least_braking(robot, script.phases[index:], q),
+            robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies,
+            velocity=velocity, rest_at=(sum(lengths) - done) * dt,
+            braking=_least_braking(robot, script.phases[index:], q),
         )  # fmt: skip
         _promises_hold(loop, phase)
         recorder.begin(index, loop, placed, done * dt)
@@ -281,6 +282,14 @@ def _promises_hold(loop: Loop, phase: Phase) -> None:
             f"phase '{phase.name}' promises a stability margin of {phase.margin:.4f} m but starts with "
             f"{loop.margin:.4f} m (CoM x={com[0]:.4f}, y={com[1]:.4f} m over {len(phase.contacts)} "
             f"contacts); move the CoM inside before it, or promise less"
+        )
+    near = loop.stack.clearance.broken() if loop.stack.clearance is not None else []
+    if near:
+        pairs = "; ".join(f"{name} {distance:.4f} m of {asked:.4f} m" for name, distance, asked in near[:4])
+        raise SpecError(
+            f"phase '{phase.name}' promises a clearance but starts nearer: {pairs}"
+            + (f" and {len(near) - 4} more" if len(near) > 4 else "")
+            + "; move them apart before it, promise less, or say who may touch (Obstacles.except_for)"
         )
     errors = loop.stack.errors()
     for task in phase.loops:

@@ -14,7 +14,7 @@ from wbplan.compiled import CompiledPhase
 from wbplan.obstacles import to_record
 from wbplan.reasons import Notes
 from wbplan.robot import Robot
-from wbplan.script import Script
+from wbplan.script import Phase, Script
 from wbplan.statics import Stance, plan_forces, promised
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION
@@ -143,6 +143,7 @@ class Recorder:
                 ],
                 "joint_acceleration": [float(a) for a in loop.compiled.acceleration],
                 **_region(loop.compiled),
+                **_kept_apart(phase),
                 "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
@@ -208,6 +209,8 @@ class Recorder:
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
             "joint_acceleration": np.max([p["joint_acceleration"] for p in self._phases], axis=0).tolist(),
             "obstacles": [to_record(item) for item in self._script.obstacles],
+            "ignored_pairs": sorted(sorted(pair) for pair in self._robot.ignored_collisions),
+            "feet": list(self._robot.feet.values()),
             "phases": self._phases,
             "why": self._notes.found,
             "report": report,
@@ -223,6 +226,24 @@ def _region(compiled: CompiledPhase) -> dict[str, Any]:
     if compiled.phase.pushes:
         found["pushes"] = [{"frame": p.frame, "force": list(p.force)} for p in compiled.phase.pushes]
     return found
+
+
+def _kept_apart(phase: Phase) -> dict[str, Any]:
+    """What a phase promises of distances: `clearance` [m]; in `kept_apart`, from what and who may touch."""
+    own, world = phase.self_collision, phase.obstacles
+    if phase.clearance is None:
+        return {}
+    return {
+        "clearance": phase.clearance,
+        "kept_apart": {
+            "self": own and own.distance,
+            "obstacles": world and world.distance,
+            "closer": [list(pair) for pair in own.except_for] if own else [],
+            "may_touch": [item if isinstance(item, str) else list(item) for item in world.except_for]
+            if world
+            else [],
+        },
+    }
 
 
 def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:

@@ -30,6 +30,7 @@ LAYERS = [
     "aims",
     "compiled",
     "kinematics",
+    "collision",
     "kernels",
     "joint_box",
     "sampling",

@@ -191,7 +191,7 @@ def test_a_speed_limit_is_a_reason_that_gives_what_it_says(legarm: wb.Robot) -> 
 
     def loop(speed: float) -> wb.Loop:
         contacts = [wb.Contact(f) for f in FEET]
-        limits = [wb.JointLimits(speed)]
+        limits = [wb.JointLimits(speed, acceleration=1e5)]
         return wb.Loop(legarm, wb.Phase("p", contacts=contacts, soft=[swing], limits=limits), start, dt=0.01)
 
     why = loop(0.2).step().why("posture")

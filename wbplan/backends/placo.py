@@ -23,6 +23,7 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from wbplan.aims import ComTarget
+from wbplan.backends.apart import keep_apart
 from wbplan.backends.placo_ascent import PlacoAscent
 from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
@@ -234,7 +235,7 @@ class PlacoBackend:
         if stack.driving:
             step[stack.driven] = stack.driven_step
         step[stack.free] = np.minimum(np.maximum(step[stack.free], stack.lower), stack.upper)
-        return step
+        return step if stack.clearance is None else keep_apart(stack, step)
 
     def _aim(self) -> None:
         """Put every target where this tick's step should lead."""

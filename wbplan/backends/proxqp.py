@@ -50,10 +50,10 @@ class ProxqpBackend:
         qp.settings.eps_abs = 1e-8
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
+        # Steps are millimetres: its usual measure takes rows that nearly agree for contradictions.
+        qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = INFEASIBLE
         qp.settings.max_iter = qp.settings.max_iter_in = 200  # inner ones go to 1500 for each outer otherwise
         qp.settings.check_duality_gap = False
-        # Steps and their bounds are small numbers: by the usual 1e-4, feasible problems pass for infeasible.
-        qp.settings.eps_primal_inf = INFEASIBLE
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
         qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         return qp
@@ -75,7 +75,7 @@ class ProxqpBackend:
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
-        if not (self._run() or self._retry() or self._eased() or (self._wait_for_margin() and self._retry())):
+        if not (self._run() or self._retry() or self._eased() or (s.relax() and self._retry())):
             raise solve_error(s, "the QP has no solution")
         results, rows = self._qp.results, len(s.d)
         y, z = self._scale * np.array(results.y), self._scale * np.array(results.z)
@@ -99,12 +99,6 @@ class ProxqpBackend:
         self._qp.solve()
         # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
         return bool(self._qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
-
-    def _wait_for_margin(self) -> bool:
-        """Ask a CoM that is outside its margin only not to go further out; False where none is."""
-        outside = bool((self._stack.d < 0.0).any())
-        np.maximum(self._stack.d, 0.0, out=self._stack.d)
-        return outside
 
     def _eased(self) -> bool:
         """With less care for stopping, where hard tasks lead on."""
