@@ -222,6 +222,7 @@ class JointBox:
     Attributes:
         lower, upper: (nf,) bounds on the step of the free columns; the base, first, has none.
         q_index: (n,) where the free joints are in q.
+        last: (nf,) the last step of the free columns.
         previous, older: (n,) the last step and the one before it; com_step: (3,) the CoM's last step [m].
         left: ticks before the robot is to be at rest, this one included.
         reach, most: (n,) how far the speed limits let the joints go in a tick, and how much further or less
@@ -235,7 +236,8 @@ class JointBox:
         self.dt = dt
         self.lower, self.upper = np.full(6 + n, -UNBOUNDED), np.full(6 + n, UNBOUNDED)
         self.q_index = joints + 1
-        self.previous, self.older, self.left = np.zeros(n), np.zeros(n), NEVER
+        self.last, self.older, self.left = np.zeros(6 + n), np.zeros(n), NEVER
+        self.previous = self.last[6:]
         self.com_step = np.zeros(3)
         self.ticks, self.factor = 1.0, 0.0
         self.reach, self.most, self.slowing, self._jerk = np.full((4, n), UNBOUNDED)
@@ -307,17 +309,29 @@ class JointBox:
             setattr(self, name, kept[name])
 
     def took(self, step: Array, com_step: Array) -> None:
-        """The free joints went on by a step (n,), the CoM by (3,) [m]."""
+        """The free columns went on by a step (nf,), the CoM by (3,) [m]."""
         self.older[:] = self.previous
-        self.previous[:], self.com_step[:] = step, com_step
+        self.last[:], self.com_step[:] = step, com_step
 
     def keep_pace(self) -> Pace:
         """What this tick knows of those before it, for `put_pace`."""
-        return self.previous.copy(), self.older.copy(), self.left, self.slowing, self.com_step.copy()
+        return self.last.copy(), self.older.copy(), self.left, self.slowing, self.com_step.copy()
 
     def put_pace(self, pace: Pace) -> None:
         """Know of the ticks before what was kept."""
-        self.previous[:], self.older[:], self.left, self.slowing, self.com_step[:] = pace
+        self.last[:], self.older[:], self.left, self.slowing, self.com_step[:] = pace
+
+    def slowed(self, gaps: Array, closing: Array, share: float) -> Array:
+        """By how much the next step may shorten distances that are to stay above zero, so that it can stop.
+
+        Args:
+            gaps: (k,) what is left of them [m].
+            closing: (k,) by how much the last step shortened them.
+            share: of what is left, that no step uses up more of.
+        """
+        slow = np.maximum(min(share, 2.0 / (self.ticks + 1.0)) * gaps, self.factor * closing)
+        most: Array = np.where(gaps > 0.0, np.minimum(gaps, slow), gaps)
+        return most
 
     def history(self) -> tuple[Array, Array, float]:
         """What `kind` has to know of this tick, kept."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from wbplan import kernels
 from wbplan.ascent import Ascent
 from wbplan.blocks import RowBlock, edge_names, name_rows
-from wbplan.collision import CAPACITY, Clearance, collision_model
+from wbplan.collision import CAPACITY, SHARE, Clearance, collision_model
 from wbplan.compiled import CompiledPhase
 from wbplan.joint_box import RECOVERY, UNBOUNDED, JointBox
 from wbplan.kinematics import Kinematics
@@ -86,6 +86,7 @@ class Stack:
         self.lower, self.upper, self.q_index = self.box.lower, self.box.upper, self.box.q_index
         self._polygon()
         self._clearance()
+        self._gaps, self._closing = np.full(len(self.d), UNBOUNDED), np.zeros(len(self.d))
         self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
 
     def _hard_rows(self) -> None:
@@ -240,10 +241,20 @@ class Stack:
         for ascent in self.ascents:
             ascent.update()
             ascent.write(self.levels[-1].H, self.levels[-1].g)
-        self.fill_box()
-        self._fill_polygon(self.closer)
+        near = slice(len(self.closer), None)
         if self.clearance is not None:
-            self.clearance.write(kin.jacobian, *self._near)
+            self.clearance.write(kin.jacobian, *self._near, share=1.0)
+            self._gaps[near], self._closing[near] = self.d[near], self.C[near] @ self.box.last
+        self.fill_box()
+        self._limit()
+
+    def _limit(self) -> None:
+        """Fill d: how much nearer things may come."""
+        self._fill_polygon(self.closer)
+        near = slice(len(self.closer), None)
+        self.d[near] = self._gaps[near]
+        if self.easing == 0:
+            self.d[near] = self.box.slowed(self._gaps[near], self._closing[near], SHARE)
 
     def _fill_polygon(self, most: Array) -> None:
         if self.phase.phase.support is not None:
@@ -259,13 +270,14 @@ class Stack:
 
     def fill_box(self) -> None:
         """Fill lower, upper and closer for this configuration."""
-        support, box = self.phase.phase.support, self.box
+        support, box, edges = self.phase.phase.support, self.box, len(self.closer)
         if support is None:
-            box.fill(self.kinematics.q, self.closer, self.closer, self.easing)
+            box.fill(self.kinematics.q, self._gaps, self._closing, self.easing)
             return
-        inside = self.distances() - (support.margin + MARGIN_RESERVE)
-        closing = self.normals @ self.box.com_step[:2]
-        box.fill(self.kinematics.q, inside, closing, self.easing)
+        inside, closing = self._gaps[:edges], self._closing[:edges]
+        inside[:] = self.distances() - (support.margin + MARGIN_RESERVE)
+        closing[:] = self.normals @ self.box.com_step[:2]
+        box.fill(self.kinematics.q, self._gaps, self._closing, self.easing)
         back, ramp = support.recovery_speed * self.dt, support.recovery_speed * self.dt**2 / RECOVERY
         kernels.approach(inside, closing, box.ticks, box.factor, back, ramp, self.easing, self.closer)
 
@@ -275,22 +287,22 @@ class Stack:
         All joints are to be able to stop together (0), or each by itself (1), or with nearly all of its
         acceleration (2): where hard tasks lead on, they cannot together. Drift waits (3).
         """
-        if self.easing >= (3 if self.drift <= SLIGHT else 2) or self.phase.phase.joint_limits is None:
+        if self.easing >= 2 + (self.drift <= SLIGHT) or self.phase.phase.joint_limits is None:
             return False
         self.easing += 1
         self.fill_box()
-        self._fill_polygon(self.closer)
+        self._limit()
         self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard] * (self.easing == 3)
         return True
 
     def begin(self, step: Array) -> None:
         """Start after a step (nv,) [m, rad], and the same before it."""
         self.kinematics.differentiate()
-        for _ in range(2):
-            self.box.took(step[self.free[6:]], self.kinematics.com_jacobian @ step)
+        self.box.took(step[self.free], self.kinematics.com_jacobian @ step)
+        self.box.older[:] = self.box.previous
 
     def soft_damping(self) -> float:
-        """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
+        """The damping on H's diagonal for the errors of the last `measure`."""
         return REGULARISATION + self.phase.damping + float(np.abs(self._soft_error) @ self._curvature)
 
     def relax(self) -> bool:
@@ -304,8 +316,7 @@ class Stack:
     def linearise(self, *, recovering: bool) -> None:
         """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves.
 
-        Args:
-            recovering: the CoM comes from outside the margin, so the correction need not bring it inside.
+        A CoM that is `recovering`, from outside its margin, need not be brought inside.
         """
         rows, kin = self.rows, self.kinematics
         given = self.driven_step.copy()
@@ -321,18 +332,6 @@ class Stack:
         if self.clearance is not None:
             self.clearance.linearise(kin.jacobian, *self._near)
         self.driven_step[:] = given
-
-    def box_kind(self, column: int, *, up: bool) -> str:
-        """What makes a free column's bound: 'position', 'speed', 'acceleration' or 'jerk'."""
-        return self.box.kind(column, float((self.upper if up else self.lower)[column]), self.box.history())
-
-    def relaxed_box(self, column: int, kind: str, by: float, *, up: bool) -> tuple[Array, Array]:
-        """Lower and upper as they would be were a limit of one joint wider by so much [rad, m, or per s]."""
-        with self.box.relaxed(column, kind, by, up=up):
-            self.fill_box()
-            moved = self.lower.copy(), self.upper.copy()
-        self.fill_box()
-        return moved
 
     # -- names -------------------------------------------------------------------------------------------
 

@@ -272,7 +272,7 @@ class Loop:
         replay = partial(self._why, q, began, keep_goals(stack), stack.box.keep_pace(), solution)
         held_back = HeldBack(stack, solution)
         self.velocity = taken / self.dt
-        stack.box.took(taken[stack.free[6:]], stack.kinematics.com - com)
+        stack.box.took(taken[stack.free], stack.kinematics.com - com)
         self.last = Tick(self, self.velocity, held_back, replay, started)
         return self.last
 

@@ -25,7 +25,7 @@ from wbplan.checks.solids import Solids, Unreadable
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-TOUCH = 0.002  #: [m], how far what may touch may go in
+TOUCH = 0.005  #: [m], how far what may touch may go in
 NEAR = 0.01  #: [m], how near to a foot's frame a shape of its link counts as the foot's
 SLACK = 2e-6  #: [m], what the two libraries' distances may differ by
 SEEN = 0.03  #: [m] beyond the bound up to which distances are measured
