@@ -53,6 +53,7 @@ LAYERS = [
     "fallback",
     "bundle",
     "checks",
+    "measures",
     "plots",
     "view",
     "physics",
