@@ -203,9 +203,7 @@ def compile_phase(
         points,
         held,
         {**now, **phase.roles},
-        acceleration,
-        braking_bounds(robot, phase, acceleration),
-        jerk_bounds(robot, phase),
+        *(acceleration, braking_bounds(robot, phase, acceleration), jerk_bounds(robot, phase)),
         tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
         standing(phase.carried, placed or {}, bodies),
     )

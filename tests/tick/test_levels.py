@@ -131,7 +131,7 @@ def test_redundant_levels_change_nothing(legarm: wb.Robot, pose: str) -> None:
     full = wb.Loop(legarm, phase([[body], *extras]), start, dt=0.01)
     for _ in range(30):
         one, other = plain.step(), full.step()
-        np.testing.assert_allclose(other.q, one.q, atol=2e-3)
+        np.testing.assert_allclose(other.q, one.q, atol=5e-3)
 
 
 def test_a_posture_above_leaves_no_joint_to_a_posture_below(legarm: wb.Robot) -> None:
