@@ -17,7 +17,15 @@ import wbplan as wb
 Refused = Callable[..., str]
 Call = Callable[..., Any]
 
-FILES = ["plan.json", "plots.png", "robot.urdf", "scene.html", "trajectory.csv", "trajectory.npz"]
+FILES = [
+    "forces.png",
+    "plan.json",
+    "plots.png",
+    "robot.urdf",
+    "scene.html",
+    "trajectory.csv",
+    "trajectory.npz",
+]
 
 
 @pytest.fixture(scope="module")

@@ -50,6 +50,7 @@ LAYERS = [
     "bundle",
     "checks",
     "plots",
+    "forceplots",
     "view",
     "physics",
     "reasons",
