@@ -6,7 +6,7 @@ from wbplan.gaits.gait import Gait
 from wbplan.gaits.ground import firm, over
 from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
 from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
-from wbplan.gaits.reach import comfortable, room, roomiest
+from wbplan.gaits.reach import comfortable, room, roomiest, shares
 from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
 from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
@@ -59,6 +59,7 @@ __all__ = [
     "room",
     "roomiest",
     "schedule",
+    "shares",
     "step_margins",
     "straight",
     "through",

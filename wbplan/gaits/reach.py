@@ -164,3 +164,25 @@ def comfortable(walker: Walker, stance: Stance, lift: float, *, adjust: bool = T
         stance = roomiest(walker, stance, lift)
         stroke = room(walker, stance, lift)
     return stance, min(0.6 * stroke, 0.5 * stance.height)
+
+
+def shares(walker: Walker, stance: Stance, heading: float) -> dict[str, Array]:
+    """What each joint of a standing leg does for the body's speed, at the middle of the stance.
+
+    Of the joint rates that move the foot straight back, the speed back that each makes by itself; 1 in all.
+
+    Args:
+        walker: the legs.
+        stance: of the feet.
+        heading: of travel in the body [rad].
+
+    Returns:
+        Leg -> share of each joint, from the body outward.
+    """
+    back = -np.array([np.cos(heading), np.sin(heading), 0.0])
+    state = walker.stand(stance)
+    found = {}
+    for leg, form in walker.closed.items():
+        jacobian = form.chain().point_jacobian(_joints(walker, leg, state.q))
+        found[leg] = (jacobian * np.linalg.solve(jacobian, back)).T @ back
+    return found

@@ -16,7 +16,9 @@ from wbplan.papers import (
     mana_simulated,
     zheng,
     zheng_case,
+    zheng_gaits,
     zhuang,
+    zhuang_gaits,
 )
 from wbplan.papers.rows import DIFFERS, Row
 
@@ -24,10 +26,10 @@ __all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
 
 PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES + mana_simulated.TABLES,
-    "zheng": zheng.TABLES + zheng_case.TABLES,
+    "zheng": zheng.TABLES + zheng_case.TABLES + zheng_gaits.TABLES,
     "hexpiderix": hexpiderix.TABLES,
     "hiphant": hiphant.TABLES + hiphant_motion.TABLES,
-    "zhuang": zhuang.TABLES,
+    "zhuang": zhuang.TABLES + zhuang_gaits.TABLES,
 }
 """Paper -> its tables, each a function that computes the rows."""
 
