@@ -18,6 +18,9 @@ import pinocchio as pin
 import wbplan as wb
 
 ROBOT = "mana"
+CLEARANCE = 0.005  # [m], of all but the feet from the ground
+BESIDE = 0.0049  # [m], between links: at 50 mm the helix leaves 4.966 mm between the body's plate and a thigh
+BALL = 0.0075  # [m], radius of the feet's balls, whose centres are the feet's frames
 
 
 def script(
@@ -51,13 +54,20 @@ def script(
         angle = 2.0 * np.pi * turns * s
         return at(radius * np.cos(angle), radius * np.sin(angle), height + pitch * turns * s)
 
+    ground = wb.Obstacle("ground", wb.Ground(), (0.0, 0.0, -BALL), friction=friction)
+
     def phase(name: str, path: wb.Path, seconds: float) -> wb.Phase:
         """The body exactly along a path: with four feet on the ground that leaves no joint any choice."""
         return wb.Phase(
             name,
             contacts=[wb.Contact(foot, friction=friction) for foot in robot.feet.values()],
             hard=[wb.PoseTask("body", path)],
-            limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+            limits=[
+                wb.JointLimits(),
+                wb.SupportPolygon(margin=margin),
+                wb.SelfCollision(BESIDE),
+                wb.Obstacles([ground], CLEARANCE),
+            ],
             duration=seconds,
         )
 

@@ -18,6 +18,8 @@ import pinocchio as pin
 import wbplan as wb
 
 ROBOT = "mana"
+CLEARANCE = 0.005  # [m], between links, and of all but the feet from the ground
+BALL = 0.0075  # [m], radius of the feet's balls, whose centres are the feet's frames
 
 
 def script(
@@ -56,12 +58,19 @@ def script(
 
         return wb.Curve(curve, seconds)
 
+    ground = wb.Obstacle("ground", wb.Ground(), (0.0, 0.0, -BALL), friction=friction)
+
     def phase(name: str, path: wb.Path, lasting: float) -> wb.Phase:
         return wb.Phase(
             name,
             contacts=[wb.Contact(foot, friction=friction) for foot in robot.feet.values()],
             hard=[wb.PoseTask("body", path)],
-            limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+            limits=[
+                wb.JointLimits(),
+                wb.SupportPolygon(margin=margin),
+                wb.SelfCollision(CLEARANCE),
+                wb.Obstacles([ground], CLEARANCE),
+            ],
             duration=lasting,
         )
 

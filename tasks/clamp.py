@@ -31,6 +31,22 @@ BOX_SIZE = (0.25, 0.15, 0.12)  # [m]
 BACK = -0.06  # where the body is kept [m] along y while the arms are ahead of it
 TALL = 0.29  # body height [m] for stepping: lower down, the shanks' limit leaves feet no room to rise
 STEP = 0.03  # how high feet rise [m]
+CLEARANCE = 0.005  # [m], of all that is not meant to touch
+INFLUENCE = 0.02  # [m], within which things are held apart; further ones are not reached in a tick
+# An arm that is folded lies in its own shank, as it is built: there its links are 2 to 4 mm apart, and its
+# jaws pass the knee at 4.9 mm.
+FOLDED = tuple(
+    (f"{limb}_{one}", f"{limb}_{other}")
+    for limb in ARMS
+    for one, other in (
+        ("arm1", "slide"),
+        ("arm2", "slide"),
+        ("arm2", "shank1"),
+        ("jaw_a", "thigh"),
+        ("jaw_b", "thigh"),
+    )
+)
+PALMS = tuple((f"{limb}_{link}", "box") for limb in ARMS for link in ("arm2", "jaw_a", "jaw_b"))
 HIGH = 0.32  # body height [m] aimed at while four legs carry: the taller, the less their hips' servos hold
 
 
@@ -68,14 +84,30 @@ def script(
     box = wb.Body("box", mass=mass, size=BOX_SIZE, pose=_pose((box_x, box_y, box_z)))
     arms_out = {joint: value for joint, value in robot.poses["manipulate"].items() if joint.startswith(ARMS)}
     legs_under = {f"{limb}_joint{k}": stand.joint(f"{limb}_joint{k}") for limb in ARMS for k in (1, 2, 3)}
-    limits = [wb.JointLimits(speed=0.8), wb.SupportPolygon(margin=margin)]
+    ground = wb.Obstacle("ground", wb.Ground(), friction=friction)
 
-    def phase(name: str, feet: Iterable[str], role: str, seconds: float, **fields: Any) -> wb.Phase:
+    def limits(touching: Iterable[str | tuple[str, str]]) -> list[Any]:
+        """All that every phase keeps; `touching` may touch the ground, or what they are named with."""
+        return [
+            wb.JointLimits(speed=0.8),
+            wb.SupportPolygon(margin=margin),
+            wb.SelfCollision(CLEARANCE, INFLUENCE, except_for=FOLDED),
+            wb.Obstacles([ground], CLEARANCE, INFLUENCE, except_for=tuple(touching)),
+        ]
+
+    def phase(
+        name: str,
+        feet: Iterable[str],
+        role: str,
+        seconds: float,
+        touching: Iterable[str | tuple[str, str]] = (),
+        **fields: Any,
+    ) -> wb.Phase:
         return wb.Phase(
             name,
             contacts=[wb.Contact(foot, friction=friction) for foot in feet],
             roles=dict.fromkeys(ARMS, role),
-            limits=limits,
+            limits=limits(touching),
             duration=seconds,
             **fields,
         )
@@ -115,13 +147,14 @@ def script(
         """Legs 3 and 6 through the air to their places."""
         return [wb.PositionTask(foot, wb.Swing(wb.AS_IS, places[foot], STEP, seconds)) for foot in STEPPERS]
 
-    def carry(name: str, path: wb.Path, seconds: float) -> wb.Phase:
+    def carry(name: str, path: wb.Path, seconds: float, touching: Iterable[str] = ()) -> wb.Phase:
         """The box, clamped between both palms, along a path."""
         return phase(
             name,
             CARRIERS,
             "arm",
             seconds,
+            touching,
             carried=[wb.Carried(box, by="limb1_tip", grip=wb.Grip("limb2_tip", friction=friction))],
             hard=[wb.RelativePoseTask("limb2_tip", root="limb1_tip")],
             soft=[wb.PoseTask("box", path, weight=(400.0, 200.0)), *free_body(seconds)],
@@ -168,13 +201,13 @@ def script(
         phase("c open", CARRIERS, "arm", 1.2, soft=[arms((*shoulder, *elbow, *wrist), 1.2), *free_body(1.2)]),
         # (d) both palms reach the box and clamp it
         phase("d reach", CARRIERS, "arm", 2.5, soft=[*palms(0.04, 2.5), *free_body(2.5)]),
-        phase("d clamp", CARRIERS, "arm", 1.0, soft=[*palms(0.0, 1.0), *free_body(1.0)]),
+        phase("d clamp", CARRIERS, "arm", 1.0, PALMS, soft=[*palms(0.0, 1.0), *free_body(1.0)]),
         # (e) lift it, and take it along a path of six degrees of freedom
-        carry("e lift", wb.MinJerk(wb.AS_IS, above, 2.0), 2.0),
+        carry("e lift", wb.MinJerk(wb.AS_IS, above, 2.0), 2.0, ["box"]),
         carry("e move", tour, 8.0),
         # (f) put it down; arms back and folded: wrist and fingers first, then elbow and shank
-        carry("f lower", wb.MinJerk(wb.AS_IS, box.pose, 2.0), 2.2),
-        phase("f release", CARRIERS, "arm", 1.0, soft=[*palms(0.04, 1.0), *free_body(1.0)]),
+        carry("f lower", wb.MinJerk(wb.AS_IS, box.pose, 2.0), 2.2, ["box"]),
+        phase("f release", CARRIERS, "arm", 1.0, PALMS, soft=[*palms(0.04, 1.0), *free_body(1.0)]),
         phase(
             "f withdraw", CARRIERS, "arm", 2.0, soft=[arms((*shoulder, *elbow, *wrist), 2.0), *free_body(2.0)]
         ),

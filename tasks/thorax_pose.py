@@ -19,6 +19,7 @@ import pinocchio as pin
 import wbplan as wb
 
 ROBOT = "hexpiderix"
+CLEARANCE = 0.005  # [m], between links, and of all but the feet from the ground
 
 STANCE = ("leg1_foot", "leg3_foot", "leg5_foot")
 LIFTED = ("leg2_foot", "leg4_foot", "leg6_foot")
@@ -53,6 +54,8 @@ def script(
     ground = {foot: start.pose(foot).translation for foot in LIFTED}
     raised = {foot: point + np.array([0.0, 0.0, lift]) for foot, point in ground.items()}
 
+    floor = wb.Obstacle("ground", wb.Ground(), friction=friction)
+
     def phase(
         name: str,
         feet: tuple[str, ...],
@@ -66,7 +69,12 @@ def script(
             name,
             contacts=[wb.Contact(foot, friction=friction) for foot in feet],
             hard=[wb.PoseTask("thorax", thorax), *moves],
-            limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+            limits=[
+                wb.JointLimits(),
+                wb.SupportPolygon(margin=margin),
+                wb.SelfCollision(CLEARANCE),
+                wb.Obstacles([floor], CLEARANCE),
+            ],
             duration=lasting,
         )
 

@@ -210,3 +210,11 @@ def with_carried(
         held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads, item.grip))
         model.appendBodyToJoint(holder.parentJoint, inertia, placement)
     return model, tuple(held)
+
+
+def standing(
+    carried: Sequence[Carried], placed: Mapping[str, Any], bodies: Sequence[Body]
+) -> tuple[tuple[Body, Any], ...]:
+    """The bodies that stand somewhere and are not carried, each with its pose in the world."""
+    held = {item.body.name for item in carried}
+    return tuple((b, placed[b.name]) for b in bodies if b.name in placed and b.name not in held)

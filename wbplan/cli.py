@@ -141,16 +141,25 @@ def run(
         str | None, typer.Option("--robot", metavar="ROBOT", help="Another robot, if the task takes others.")
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Serve the plan in Meshcat until Ctrl-C.")] = False,
+    partial: Annotated[
+        Path | None, typer.Option(help="Folder for the plan up to where it fails, if it does.")
+    ] = None,
 ) -> None:
     """Plan a task, write its bundle, and check every promise of it."""
     file = load_task(task)
     values = file.values(settings or [])
     folder = out if out is not None else Path("out") / file.name
-    _require_place(folder)
+    for place in (folder, partial):
+        if place is not None:
+            _require_place(place)
 
     robot = load_robot(file.robot_for(robot_name))
     script = file.script(robot, values)
-    with _live_view(robot, script, view) as observe, _progress_bar(file.name) as progress:
+    with (
+        _live_view(robot, script, view) as observe,
+        _progress_bar(file.name) as progress,
+        _kept(partial),
+    ):
         planned = plan(
             robot,
             script,
@@ -180,8 +189,12 @@ def check(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A bundle, as `wbplan run` writes it.")],
 ) -> None:
     """Recompute every promise of a bundle from its files; exit code 1 where one is broken."""
-    checked = recompute(Bundle.read(folder))
-    _console().print(checked.table())
+    bundle = Bundle.read(folder)
+    checked = recompute(bundle)
+    console = _console()
+    console.print(checked.table())
+    if reason := bundle.plan["report"].get("incomplete"):
+        console.print(f"incomplete: it ends where no step was found: {reason}", soft_wrap=True)
     checked.require()
 
 
@@ -200,6 +213,8 @@ def simulate(
     bundle = Bundle.read(folder)
     with _progress_bar(str(folder)) as progress:
         done = replay(bundle, trials=trials, seed=seed, progress=progress)
+    if Bundle.read(folder).plan != bundle.plan:
+        raise BundleError(f"{folder}: was replaced while it was simulated; simulate it again")
     report = done.save(folder)
     print_simulation(done, _console())
     print(f"written to {report}")
@@ -330,6 +345,20 @@ def _require_place(folder: Path) -> None:
             raise BundleError(f"cannot write to '{folder}': no permission to write in '{above}'")
     except OSError as error:
         raise BundleError(f"cannot write to '{folder}': {error.strerror or error}") from None
+
+
+@contextmanager
+def _kept(folder: Path | None) -> Iterator[None]:
+    """Writes what was planned before a failure, where a folder is given for it."""
+    try:
+        yield
+    except SolveError as error:
+        if folder is None or error.partial is None:
+            raise
+        error.partial.save(folder)
+        raise SolveError(
+            f"{error}; the plan until then is in {folder}", error.clashes, error.limits
+        ) from None
 
 
 @contextmanager

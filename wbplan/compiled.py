@@ -5,7 +5,7 @@ Nothing here is a matrix: both backends start from this.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
-from wbplan.bodies import Held, frame_number, with_carried
+from wbplan.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
 from wbplan.objectives import BalanceTask, ManipulabilityTask
@@ -98,6 +98,7 @@ class CompiledPhase:
             in one plane and nothing pushes.
         ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
+        standing: bodies that stand in the world and are not carried, each with its pose.
     """
 
     robot: Robot
@@ -116,6 +117,7 @@ class CompiledPhase:
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
     ascents: tuple[AscentTarget, ...] = ()
+    standing: tuple[tuple[Body, Any], ...] = ()
 
     @property
     def margin(self) -> float | None:
@@ -129,6 +131,7 @@ def compile_phase(
     q: Array,
     placed: Mapping[str, Any] | None = None,
     roles: Mapping[str, str | None] | None = None,
+    bodies: Sequence[Body] = (),
 ) -> CompiledPhase:
     """Look up every name of a phase and bind its targets to a start configuration.
 
@@ -138,6 +141,7 @@ def compile_phase(
         q: (nq,) configuration at the phase's start.
         placed: pose in the world of every body that stands somewhere, by name.
         roles: the role that each limb is in; by default read off `q`.
+        bodies: the script's; those in `placed` that are not carried stand in the way.
 
     Raises:
         SpecError: a name does not exist, or two parts of the phase do not fit.
@@ -192,6 +196,7 @@ def compile_phase(
         held,
         {**now, **phase.roles},
         tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
+        standing(phase.carried, placed or {}, bodies),
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 
 class WbplanError(Exception):
@@ -54,11 +55,20 @@ class SolveError(WbplanError):
     Attributes:
         clashes: the hard rows that contradict each other (or the limits), and by how much.
         limits: names of the limits that stand against them.
+        partial: from `wbplan.plan`, the `Plan` up to the last state that keeps every promise, its report's
+            `incomplete` saying why it ends there; None where there is none.
     """
 
-    def __init__(self, message: str, clashes: Sequence[Relaxation] = (), limits: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        message: str,
+        clashes: Sequence[Relaxation] = (),
+        limits: Sequence[str] = (),
+        partial: Any = None,
+    ) -> None:
         self.clashes = tuple(clashes)
         self.limits = tuple(limits)
+        self.partial = partial
         super().__init__(message)
 
 

@@ -112,13 +112,27 @@ class SelfCollision:
     Args:
         distance: [m].
         influence: [m], pairs further apart than this have no row.
+        except_for: pairs of links that are made to lie closer, as a folded arm in its cradle: they may touch,
+            but not go into each other.
+
+    Raises:
+        SpecError: a field is not what it has to be.
     """
 
     distance: float = 0.005
     influence: float = 0.05
+    except_for: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         _reaches(self)
+        what = "SelfCollision.except_for"
+        excepted = [
+            _exception(item, what) for item in _listed(self.except_for, f"{what}: expected a list of pairs")
+        ]
+        for item in excepted:
+            if isinstance(item, str):
+                raise SpecError(f"{what}: expected pairs of links, got {item!r}")
+        object.__setattr__(self, "except_for", tuple(excepted))
 
 
 @final
@@ -156,7 +170,9 @@ class Obstacles:
             raise SpecError(f"Obstacles.shapes: named more than once: {', '.join(twice)}")
         excepted = _listed(self.except_for, "Obstacles.except_for: expected a list of frames")
         object.__setattr__(self, "shapes", shapes)
-        object.__setattr__(self, "except_for", tuple(_exception(item) for item in excepted))
+        object.__setattr__(
+            self, "except_for", tuple(_exception(item, "Obstacles.except_for") for item in excepted)
+        )
 
     @cached_property
     def terrain(self) -> Terrain:
@@ -170,10 +186,9 @@ def _listed(given: object, what: str) -> tuple[Any, ...]:
     return tuple(given)
 
 
-def _exception(item: object) -> str | tuple[str, str]:
-    what = "Obstacles.except_for"
+def _exception(item: object, what: str) -> str | tuple[str, str]:
     if isinstance(item, list | tuple):
         if len(item) != 2:
-            raise SpecError(f"{what}: expected a frame or (frame, obstacle), got {item!r}")
-        return name_of(item[0], f"{what}: frame"), name_of(item[1], f"{what}: obstacle")
+            raise SpecError(f"{what}: expected a name or two, got {item!r}")
+        return name_of(item[0], what), name_of(item[1], what)
     return name_of(item, what)

@@ -19,6 +19,7 @@ from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.fallback import Retries
 from wbplan.paths import number
 from wbplan.reasons import why_at
 from wbplan.recorder import Recorder
@@ -55,7 +56,10 @@ class Plan:
 
     @property
     def report(self) -> Mapping[str, Any]:
-        """Seconds of planning and motion, ticks, their median and p99 [us], worst errors, warnings."""
+        """Seconds of planning and motion, ticks, their median and p99 [us], worst errors, warnings, retries.
+
+        `incomplete` says why a plan ends early: only `SolveError.partial` has it.
+        """
         report: Mapping[str, Any] = self.bundle.plan["report"]
         return report
 
@@ -81,7 +85,7 @@ class Plan:
 
     def check(self) -> CheckReport:
         """Every promise recomputed from q, the URDF and the phases' specifications."""
-        return check(self.bundle)
+        return check(self.bundle, folders=self._folders)
 
     def save(self, folder: str | Path) -> Path:
         """Write the bundle, with its animation and plots, whole or not at all.
@@ -156,7 +160,8 @@ def plan(
     Raises:
         SpecError: the script does not fit the robot, the start is outside the joint limits, or a phase
             promises what its start does not hold.
-        SolveError: a tick has no step that keeps every hard promise.
+        SolveError: a tick has no step that keeps every hard promise, or neither backend finds it; the error's
+            `partial` is the plan until then.
     """
     script = script if isinstance(script, Script) else Script(script)
     dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
@@ -169,14 +174,24 @@ def plan(
     placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
     started = time.perf_counter()
-    recorder, loops = Recorder(robot, script, dt), []
+    recorder, retries = Recorder(robot, script, dt), Retries()
+    loops: list[tuple[float, Loop]] = []
+
+    def planned(incomplete: str = "") -> Plan:
+        seconds = time.perf_counter() - started
+        told = {"retries": retries.made, **({"incomplete": incomplete} if incomplete else {})}
+        found = recorder.bundle(task, backend, dict(parameters or {}), seconds, retries.warnings())
+        report = {**found.plan["report"], **told}
+        whole = Bundle({**found.plan, "report": report}, found.trajectory, found.urdf)
+        return Plan(robot, whole, tuple(loops))
+
     lengths = [max(1, int(np.ceil(phase.duration / dt - 1e-9))) for phase in script.phases]
     done = 0  # ticks
     for phase in script.phases:
         if phase.joint_limits is None:
             raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
-        loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles)
+        loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies)
         _promises_hold(loop, phase)
         recorder.begin(index, loop, placed, done * dt)
         loops.append((done * dt, loop))
@@ -186,10 +201,13 @@ def plan(
             if progress is not None and k % 20 == 0:
                 progress((done + k) / sum(lengths), phase.name)
             try:
-                tick = loop.step()
+                tick = retries.step(loop, (done + k) * dt)
             except SolveError as error:
-                where = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into"
-                raise SolveError(f"{where} {error}", error.clashes, error.limits) from None
+                said = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into {error}"
+                kept = None
+                with contextlib.suppress(WbplanError):  # forces that nobody can give: then nothing is kept
+                    kept = planned(said) if recorder.cut(index, loop, (done + k) * dt) else None
+                raise SolveError(said, error.clashes, error.limits, kept) from None
             recorder.record(loop, tick)
         done += ticks
         q, roles = loop.q, loop.compiled.roles
@@ -199,8 +217,7 @@ def plan(
         observe(loop, done * dt)
     if progress is not None:
         progress(1.0, "done")
-    bundle = recorder.bundle(task, backend, dict(parameters or {}), time.perf_counter() - started)
-    return Plan(robot, bundle, tuple(loops))
+    return planned()
 
 
 def _compile_kernels(
@@ -254,6 +271,14 @@ def _promises_hold(loop: Loop, phase: Phase) -> None:
             f"phase '{phase.name}' promises a stability margin of {phase.margin:.4f} m but starts with "
             f"{loop.margin:.4f} m (CoM x={com[0]:.4f}, y={com[1]:.4f} m over {len(phase.contacts)} "
             f"contacts); move the CoM inside before it, or promise less"
+        )
+    near = loop.stack.clearance.broken() if loop.stack.clearance is not None else []
+    if near:
+        pairs = "; ".join(f"{name} {distance:.4f} m of {asked:.4f} m" for name, distance, asked in near[:4])
+        raise SpecError(
+            f"phase '{phase.name}' promises a clearance but starts nearer: {pairs}"
+            + (f" and {len(near) - 4} more" if len(near) > 4 else "")
+            + "; move them apart before it, promise less, or say who may touch (Obstacles.except_for)"
         )
     errors = loop.stack.errors()
     for task in phase.loops:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -14,7 +14,7 @@ from wbplan.compiled import CompiledPhase
 from wbplan.obstacles import to_record
 from wbplan.reasons import Notes
 from wbplan.robot import Robot
-from wbplan.script import Script
+from wbplan.script import Phase, Script
 from wbplan.statics import Stance, plan_forces, promised
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION
@@ -48,12 +48,7 @@ class Recorder:
         self._stances: list[Stance] = []
         self._start = 0.0
         self._notes = Notes(script.duration)
-
-    def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
-        """A phase starts: what was the last sample of the one before becomes the first of this one."""
-        self._placed = {name: pin.SE3ToXYZQUAT(pose) for name, pose in placed.items()}
-        self._start = elapsed
-        for samples in (
+        self._samples: tuple[list[Any], ...] = (
             self._q,
             self._com,
             self._margin,
@@ -62,11 +57,27 @@ class Recorder:
             self._measures,
             self._targets,
             self._bodies,
-        ):
-            if samples:
-                samples.pop()
+        )
+        self._edge: list[Any] = []
+
+    def begin(self, index: int, loop: Loop, placed: Mapping[str, Any], elapsed: float) -> None:
+        """A phase starts: what was the last sample of the one before becomes the first of this one."""
+        self._placed = {name: pin.SE3ToXYZQUAT(pose) for name, pose in placed.items()}
+        self._start = elapsed
+        self._edge = [samples.pop() for samples in self._samples if samples]
         self._sample(index, loop)
         self._index = index
+
+    def cut(self, index: int, loop: Loop, elapsed: float) -> bool:
+        """A phase breaks off at time `elapsed` [s]; False where nothing moved before that."""
+        if not self._v:
+            return False
+        if self._phase.count(index) > 1:
+            self.end(index, loop, elapsed)
+        else:  # it never moved: the edge's sample goes back to the phase before
+            for samples, last in zip(self._samples, self._edge, strict=True):
+                samples[-1] = last
+        return True
 
     def record(self, loop: Loop, tick: Tick) -> None:
         """One tick was made."""
@@ -131,13 +142,21 @@ class Recorder:
                     for h in loop.compiled.held
                 ],
                 **_region(loop.compiled),
+                **_kept_apart(phase),
                 "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
                 "roles": {limb: role for limb, role in loop.compiled.roles.items() if role is not None},
                 "tasks": tasks,
             }
         )
 
-    def bundle(self, task: str, backend: str, parameters: dict[str, Any], seconds: float) -> Bundle:
+    def bundle(
+        self,
+        task: str,
+        backend: str,
+        parameters: dict[str, Any],
+        seconds: float,
+        warnings: Sequence[str] = (),
+    ) -> Bundle:
         """Everything recorded, as a bundle."""
         n = len(self._q)
         margin = np.array(self._margin)
@@ -176,7 +195,7 @@ class Recorder:
             "median_us": float(np.median(microseconds)),
             "p99_us": float(np.percentile(microseconds, 99)),
             "worst": dict(self._worst),
-            "warnings": list(dict.fromkeys(self._warnings)),
+            "warnings": list(dict.fromkeys([*self._warnings, *warnings])),
         }
         plan = {
             "schema": SCHEMA,
@@ -188,6 +207,8 @@ class Recorder:
             "parameters": parameters,
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
             "obstacles": [to_record(item) for item in self._script.obstacles],
+            "ignored_pairs": sorted(sorted(pair) for pair in self._robot.ignored_collisions),
+            "feet": list(self._robot.feet.values()),
             "phases": self._phases,
             "why": self._notes.found,
             "report": report,
@@ -203,6 +224,24 @@ def _region(compiled: CompiledPhase) -> dict[str, Any]:
     if compiled.phase.pushes:
         found["pushes"] = [{"frame": p.frame, "force": list(p.force)} for p in compiled.phase.pushes]
     return found
+
+
+def _kept_apart(phase: Phase) -> dict[str, Any]:
+    """What a phase promises of distances: `clearance` [m]; in `kept_apart`, from what and who may touch."""
+    own, world = phase.self_collision, phase.obstacles
+    if phase.clearance is None:
+        return {}
+    return {
+        "clearance": phase.clearance,
+        "kept_apart": {
+            "self": own and own.distance,
+            "obstacles": world and world.distance,
+            "closer": [list(pair) for pair in own.except_for] if own else [],
+            "may_touch": [item if isinstance(item, str) else list(item) for item in world.except_for]
+            if world
+            else [],
+        },
+    }
 
 
 def _columns(samples: list[dict[str, Any]], width: int) -> dict[str, Array]:

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from wbplan import kernels
 from wbplan.aims import ComTarget
-from wbplan.compiled import WORLD, FrameTarget
+from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.kinematics import Kinematics
 from wbplan.paths import checked
 from wbplan.sampling import sample
@@ -252,3 +252,20 @@ class Rows:
             self.chosen,
             self.wrench,
         )
+
+
+def levers(phase: CompiledPhase, rows: Rows, span: slice) -> Array:
+    """Bound on the curvature of each row, per unit of its error: lever arm [m], or 1 for a rotation."""
+    model, found = phase.model, []
+    longest = max(reach(model, k) for k in range(len(model.frames)))
+    # A base on its feet moves by the legs that it stands on: their length is its lever arm.
+    held = (t for t in phase.frame_targets if t.hard)
+    standing = max((reach(model, t.frame) for t in held), default=0.0)
+    for target, row in zip(rows.targets_of_rows[span], rows.chosen[span], strict=True):
+        if not isinstance(target, FrameTarget):
+            found.append(longest)
+        elif row // 3 < len(rows.position_targets):
+            found.append(max(standing, reach(model, target.frame), reach(model, target.root)))
+        else:
+            found.append(1.0)
+    return np.array(found)

@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 
 from wbplan import kernels
 from wbplan.ascent import Ascent
-from wbplan.blocks import RowBlock
-from wbplan.compiled import CompiledPhase, FrameTarget
+from wbplan.blocks import RowBlock, edge_names, name_rows
+from wbplan.collision import CAPACITY, Clearance, collision_model
+from wbplan.compiled import CompiledPhase
 from wbplan.kinematics import Kinematics
 from wbplan.levels import Level
 from wbplan.paths import number
 from wbplan.posture import Posture
-from wbplan.rows import Rows, reach
+from wbplan.rows import Rows, levers
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,7 @@ class Stack:
         hard_error: (m,) error of the hard rows at the last `measure`; drift: the largest of them.
         margin: stability margin [m] at the last `measure`; infinite where the phase has no polygon.
         blocks: what the rows of C are.
+        clearance: distances between links, bodies and obstacles; None where the phase promises none.
         levels: the soft tasks by priority; H and g are those of the first.
         normals: (E, 2) of the support polygon's edges.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
@@ -78,6 +80,7 @@ class Stack:
         self._soft_rows()
         self._joint_box()
         self._polygon()
+        self._clearance()
         self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
 
     def _hard_rows(self) -> None:
@@ -149,20 +152,7 @@ class Stack:
 
     def levers(self, rows: slice) -> Array:
         """Bound on each row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
-        model, levers = self.phase.model, []
-        longest = max(reach(model, k) for k in range(len(model.frames)))
-        # A base on its feet moves by the legs that it stands on: their length is its lever arm.
-        held = (t for t in self.phase.frame_targets if t.hard)
-        standing = max((reach(model, t.frame) for t in held), default=0.0)
-        for target, row in zip(self.rows.targets_of_rows[rows], self.rows.chosen[rows], strict=True):
-            group = row // 3
-            if not isinstance(target, FrameTarget):
-                levers.append(longest)
-            elif group < len(self.rows.position_targets):
-                levers.append(max(standing, reach(model, target.frame), reach(model, target.root)))
-            else:
-                levers.append(1.0)
-        return np.array(levers)
+        return levers(self.phase, self.rows, rows)
 
     def _joint_box(self) -> None:
         """Bounds of the free joints; the base (first six columns) has none."""
@@ -187,6 +177,19 @@ class Stack:
         self.blocks: list[RowBlock] = []
         if edges:
             self.blocks.append(RowBlock("margin", "m", slice(0, edges), lambda: self.edge_names))
+        self._edges = (self.C, self.d)
+
+    def _clearance(self) -> None:
+        """Rows below the polygon's, as many at every tick."""
+        self.clearance: Clearance | None = None
+        if self.phase.phase.clearance is None:
+            return
+        self.clearance = Clearance(collision_model(self.phase), self.kinematics, self.dt)
+        edges, nf = len(self.d), len(self.free)
+        self.C, self.d = np.zeros((edges + CAPACITY, nf)), np.full(edges + CAPACITY, UNBOUNDED)
+        self._edges, near = (self.C[:edges], self.d[:edges]), slice(edges, edges + CAPACITY)
+        self._near = (self.free, self.driven, self.driven_step, self.C[near], self.d[near], UNBOUNDED)
+        self.blocks.append(RowBlock("clearance", "m", near, self.clearance.keep_names))
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -221,6 +224,8 @@ class Stack:
         """Kinematics, errors and margin at `q` for the targets as they stand now."""
         rows = self.rows
         self.kinematics.update(q)
+        if self.clearance is not None:
+            self.clearance.measure()
         self.drift, self.margin = rows.measure(self.kinematics, self.normals, self._offsets)
         self.hard_error[: rows.hard] = rows.error[: rows.hard]
         for i, (joint, _, _) in enumerate(self.hard_joints):
@@ -249,12 +254,14 @@ class Stack:
         support = self.phase.phase.support
         if support is not None:
             self._fill_polygon(support.margin, -support.recovery_speed * self.dt)
+        if self.clearance is not None:
+            self.clearance.write(kin.jacobian, *self._near)
 
     def _fill_polygon(self, margin: float, least: float) -> None:
         kin = self.kinematics
         kernels.polygon(
             self.normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
-            margin + MARGIN_RESERVE, least, self.C, self.d,
+            margin + MARGIN_RESERVE, least, *self._edges,
         )  # fmt: skip
 
     def distances(self) -> Array:
@@ -272,6 +279,14 @@ class Stack:
         """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
         return REGULARISATION + self.phase.damping + float(np.abs(self._soft_error) @ self._curvature)
 
+    def relax(self) -> bool:
+        """Ask what is outside its limits only not to go further out; False where that changes nothing."""
+        before = self.d.copy()
+        np.maximum(self._edges[1], 0.0, out=self._edges[1])
+        if self.clearance is not None:
+            self.clearance.relax(self.kinematics.jacobian, *self._near)
+        return not np.array_equal(before, self.d)
+
     def linearise(self, *, recovering: bool) -> None:
         """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves.
 
@@ -288,6 +303,8 @@ class Stack:
         support = self.phase.phase.support
         if support is not None:
             self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
+        if self.clearance is not None:
+            self.clearance.linearise(kin.jacobian, *self._near)
         self.driven_step[:] = given
 
     def reach(self, column: int) -> float:
@@ -322,11 +339,8 @@ class Stack:
         for label, part, span in self.rows.labels:
             if span.stop <= self.rows.hard:
                 names += [(label, "m" if part == "position" else "rad")] * (span.stop - span.start)
-        sliding = {
-            j
-            for j, joint in enumerate(list(self.phase.model.joints)[2:])
-            if "JointModelP" in joint.shortname()
-        }
+        joints = enumerate(list(self.phase.model.joints)[2:])
+        sliding = {j for j, joint in joints if "JointModelP" in joint.shortname()}
         return names + [(label, "m" if j in sliding else "rad") for j, _, label in self.hard_joints]
 
     def row_names(self) -> list[tuple[str, str, str]]:
@@ -335,30 +349,16 @@ class Stack:
 
     def keep_row_names(self) -> Callable[[], list[tuple[str, str, str]]]:
         """`row_names` of this moment, to be worked out whenever somebody asks."""
-        return partial(self._name_rows, [block.keep() for block in self.blocks])
-
-    def _name_rows(self, names: list[Callable[[], list[str]]]) -> list[tuple[str, str, str]]:
-        return [
-            (name, block.kind, block.unit)
-            for block, called in zip(self.blocks, names, strict=True)
-            for name in called()
-        ]
+        return partial(name_rows, self.blocks, [block.keep() for block in self.blocks])
 
     def edge_names(self) -> list[str]:
         """Name of every support-polygon row: the two feet that its edge joins, or a side of the region."""
-        if self.phase.polygon is None:
-            return []
-        if self.phase.region:
-            angles = np.degrees(np.arctan2(*self.phase.polygon.normals.T[::-1]))
-            return [f"support region, side towards {angle:.0f} deg" for angle in angles]
-        feet = [c.frame for c in self.phase.phase.contacts]
-        return [f"support polygon edge {feet[i]}-{feet[j]}" for i, j in self.phase.polygon.edges]
+        return edge_names(self.phase)
 
     def box_names(self) -> list[tuple[str, str]]:
         """(lower, upper) bound's name of every free column."""
-        names: list[tuple[str, str]] = [("base", "base")] * 6
-        joints = self.phase.robot.joint_names
-        return names + [(f"{joints[c - 6]} lower", f"{joints[c - 6]} upper") for c in self.free[6:]]
+        joints = [self.phase.robot.joint_names[c - 6] for c in self.free[6:]]
+        return [("base", "base")] * 6 + [(f"{joint} lower", f"{joint} upper") for joint in joints]
 
     def errors(self) -> dict[str, float]:
         """Norm of every task's error at the last `measure`.

@@ -26,6 +26,9 @@ from wbplan.state import State
 
 Array = NDArray[np.float64]
 
+#: Squares of larger weights, times squares of errors, overflow.
+MOST = 1e12
+
 #: Default gain of soft tasks [1/s]: an error decays with a time constant of 50 ms.
 GAIN = 20.0
 
@@ -34,7 +37,7 @@ def _weights(value: object, count: int, what: str) -> Array:
     """Read-only (count,) weights from one number or `count` of them."""
     expected = "a finite number of 0 or more" + (f", or {count} of them" if count > 1 else "")
     given = numeric(value)
-    if given is None or given.shape not in ((), (count,)) or not (np.isfinite(given) & (given >= 0.0)).all():
+    if given is None or given.shape not in ((), (count,)) or not ((given >= 0.0) & (given <= MOST)).all():
         raise SpecError(f"{what}: expected {expected}, got {value!r}")
     weights = np.array(np.broadcast_to(given, (count,)))
     weights.setflags(write=False)
@@ -42,7 +45,10 @@ def _weights(value: object, count: int, what: str) -> Array:
 
 
 def _weight(value: object, what: str) -> float:
-    return number(value, what, "a finite number of 0 or more", least=0.0)
+    weight = number(value, what, "a finite number of 0 or more", least=0.0)
+    if weight > MOST:
+        raise SpecError(f"{what}: expected a weight of at most {MOST:g}, got {weight:g}")
+    return weight
 
 
 def _pose_weights(value: Any, what: str) -> tuple[Array, Array]:

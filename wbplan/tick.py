@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 from typing import Any, final
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from wbplan.active import Active, HeldBack
 from wbplan.backends import Backend, make_backend
+from wbplan.bodies import Body
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
@@ -47,6 +48,7 @@ class Tick:
         t: time [s] of the phase at the end of the step.
         q: (nq,) configuration then; v: (nv,) constant tangent velocity that led there [m/s, rad/s].
         com: (3,) [m]; margin: [m], infinite where the phase has no support polygon.
+        clearance: the least distance [m] that is promised; infinite where none is, or nothing is near.
         microseconds: wall time of the step.
         warning: '' or why a promise is not yet kept, as 'margin not yet reached'.
     """
@@ -57,6 +59,7 @@ class Tick:
         "_held_back",
         "_measures",
         "_replay",
+        "clearance",
         "com",
         "margin",
         "microseconds",
@@ -72,6 +75,7 @@ class Tick:
         stack = loop.stack
         self.t, self.q, self.v = loop.t, loop.q, v
         self.com, self.margin = stack.kinematics.com.copy(), stack.margin
+        self.clearance = np.inf if stack.clearance is None else stack.clearance.least
         self._errors, self._held_back = stack.keep_errors(), held_back
         self._measures = stack.keep_measures()
         self._replay = replay
@@ -79,6 +83,9 @@ class Tick:
         self.warning = ""
         if promised is not None and self.margin < promised - 1e-6:
             self.warning = f"margin not yet reached: {self.margin:.4f} m of {promised:.4f} m"
+        asked = loop.compiled.phase.clearance
+        if asked is not None and self.clearance < asked - 1e-6:
+            self.warning += f"{'; ' if self.warning else ''}clearance not yet reached: {self.clearance:.4f} m"
         self.microseconds = 1e6 * (time.perf_counter() - started)
 
     @cached_property
@@ -127,6 +134,7 @@ class Loop:
         backend: 'proxqp' or 'placo'.
         placed: pose in the world of bodies that stand somewhere, by name.
         roles: the role that each limb is in, where `q` leaves it open.
+        bodies: the bodies that there are; those in `placed` that are not carried stand in the way.
 
     Attributes:
         last: the last tick made; None before the first.
@@ -145,12 +153,13 @@ class Loop:
         backend: str = "proxqp",
         placed: Mapping[str, Any] | None = None,
         roles: Mapping[str, str | None] | None = None,
+        bodies: Sequence[Body] = (),
     ) -> None:
         self.dt, self.t = number(dt, "dt", "a finite positive time in seconds", above=0.0), 0.0
         if isinstance(state, State) and list(state.model.names) != list(robot.model.names):
             raise SpecError(f"state: one of '{state.model.name}', expected one of '{robot.name}'")
         start = State(robot.model, state.q if isinstance(state, State) else state)
-        self.compiled: CompiledPhase = compile_phase(robot, phase, start.q, placed, roles)
+        self.compiled: CompiledPhase = compile_phase(robot, phase, start.q, placed, roles, bodies)
         self.stack = Stack(self.compiled, self.dt)
         self.q: Array = np.array(start.q)
         self.stack.aim(0.0)
@@ -159,6 +168,22 @@ class Loop:
         self._retraction = Retraction(self.stack)
         self.last: Tick | None = None
         self._second: tuple[Stack, Backend | None] | None = None
+
+    @property
+    def backend(self) -> str:
+        """Name of the backend that solves."""
+        return self._backend.name
+
+    def restart(self, backend: str | None = None) -> None:
+        """Go on from here with a new solver, which remembers nothing of the ticks before.
+
+        Args:
+            backend: 'proxqp' or 'placo'; by default the same as before.
+
+        Raises:
+            SpecError: there is no such backend, or it cannot express the phase.
+        """
+        self._backend = make_backend(backend or self.backend, self.stack)
 
     @property
     def margin(self) -> float:
@@ -210,10 +235,12 @@ class Loop:
             stack.aim(self.t)
             stack.measure(q)
         before = stack.margin
+        if stack.clearance is not None:
+            stack.clearance.start()
         ends = self.t + self.dt
         try:
             stack.advance(self.t)
-            solution = self._backend.solve()
+            solution = self._solve()
             new = self._keep(q, solution.step, before)
         except WbplanError:
             stack.aim(self.t)
@@ -244,6 +271,15 @@ class Loop:
             solution = backend.solve()
         return explain(stack, active_sets(stack, solution), task, part)
 
+    def _solve(self) -> Solution:
+        """What the backend finds; whatever its library throws is a `SolveError`."""
+        try:
+            return self._backend.solve()
+        except (RuntimeError, ArithmeticError, ValueError) as error:
+            said = " ".join(str(error).split())[:200]
+            name = self.compiled.phase.name
+            raise SolveError(f"phase '{name}': the solver of '{self.backend}' failed: {said}") from error
+
     def _keep(self, q: Array, step: Array, before: float) -> Array:
         """The configuration after `step`, corrected for what its rows neglect; or a `SolveError`."""
         stack, model = self.stack, self.compiled.model
@@ -264,6 +300,8 @@ class Loop:
                 f"phase '{self.compiled.phase.name}': the step leaves a stability margin of "
                 f"{stack.margin:.5f} m, {self.compiled.margin} m is promised; move slower or use a smaller dt"
             )
+        if not self._clear():
+            raise self._too_near()
         return new
 
     def _off(self, q: Array, label: str, unit: str, by: float) -> SolveError:
@@ -279,7 +317,19 @@ class Loop:
         )
 
     def _kept(self, before: float) -> bool:
-        return self.stack.drift <= DRIFT and self._margin_kept(before)
+        return self.stack.drift <= DRIFT and self._margin_kept(before) and self._clear()
+
+    def _clear(self) -> bool:
+        """Whether all distances are kept, or are no less than before."""
+        return self.stack.clearance is None or self.stack.clearance.kept()
+
+    def _too_near(self) -> SolveError:
+        clearance = self.stack.clearance
+        name, distance, bound = clearance.worst() if clearance is not None else ("", 0.0, 0.0)
+        return SolveError(
+            f"phase '{self.compiled.phase.name}': the step brings {name} to {distance:.5f} m of each other, "
+            f"{bound:.5f} m is to be kept; choose another path, move slower or use a smaller dt"
+        )
 
     def _margin_kept(self, before: float) -> bool:
         """Inside the promise, or, coming from outside of it, no further out than before."""

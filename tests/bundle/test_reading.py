@@ -212,3 +212,23 @@ def test_any_byte_of_the_arrays_may_be_damaged(scratch: Callable[[], Path], at: 
     (folder / "trajectory.npz").write_bytes(bytes(content))
     with contextlib.suppress(BundleError):
         assert check(Bundle.read(folder)).ok
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ('<mass value="4.0"/>', '<mass value="%s%n"/>', "mass value"),  # Pinocchio's parser crashes on it
+        ('<mass value="4.0"/>', "<mass/>", "expected a value"),
+        ('<axis xyz="1 0 0"/>', '<axis xyz="0 nan 1"/>', "axis xyz"),
+        ('<robot name="quad">', '<robot name="quad" a:b="c">', "no URDF that can be read"),
+        ("</robot>", "", "no URDF that can be read"),
+        ("</robot>", f"{'<a>' * 5000}{'</a>' * 5000}</robot>", "no URDF that Pinocchio can build"),
+    ],
+)
+def test_a_urdf_that_no_parser_should_see(folder: Path, old: str, new: str, word: str) -> None:
+    file = folder / "robot.urdf"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(BundleError, match=word):
+        Bundle.read(folder)

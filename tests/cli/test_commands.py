@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import wbplan as wb
+from wbplan import cli
+from wbplan.bundle import Bundle
 
 Refused = Callable[..., str]
 Call = Callable[..., Any]
@@ -237,3 +239,46 @@ def test_a_taken_port(refused: Refused, bundle: Path) -> None:
         taken.listen()
         port = str(taken.getsockname()[1])
         assert port in refused("view", str(bundle), "--port", port)
+
+
+STRETCHED = '''"""Stretched: the body rises until the legs are at their end."""
+import wbplan as wb
+from wbplan import cli
+from wbplan.bundle import Bundle
+ROBOT = "mana"
+def script(robot):
+    stand = robot.state("stand")
+    contacts = [wb.Contact(foot) for foot in robot.feet.values()]
+    rise = wb.ComTask(wb.MinJerk(stand.com, stand.com + [0.0, 0.0, 2.0], 4.0))
+    return wb.Script(wb.Phase("rise", contacts=contacts, hard=[rise], duration=4.0))
+'''
+
+
+def test_a_plan_that_fails_on_its_way_is_kept_where_asked_for(wbplan: Call, tmp_path: Path) -> None:
+    (tmp_path / "stretched.py").write_text(STRETCHED, encoding="utf-8")
+    ran = wbplan("run", "stretched.py", "--partial", "until")
+    assert ran.code == 1
+    assert "no plan exists: at " in ran.err
+    assert "the plan until then is in until" in ran.err
+    assert not (tmp_path / "out").exists()
+    checked = wbplan("check", "until")
+    assert checked.code == 0, checked
+    assert "incomplete: it ends where no step was found: at " in checked.out
+
+
+def test_a_bundle_replaced_while_it_is_simulated_gets_no_verdict(
+    wbplan: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert wbplan("run", "sway.py", "--out", "a").code == 0
+    real = cli.replay
+
+    def replay(bundle: Bundle, **asked: object) -> object:
+        done = real(bundle, **asked)
+        assert cli.main(["run", "sway.py", "--out", "a", "--set", "sway=0.005"]) == 0
+        return done
+
+    monkeypatch.setattr(cli, "replay", replay)
+    ran = wbplan("simulate", "a")
+    assert ran.code == 2
+    assert "was replaced while it was simulated" in ran.err
+    assert not (tmp_path / "a" / "physics.json").exists()

@@ -96,3 +96,26 @@ def test_view_serves_until_ctrl_c(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=30)
     assert (process.returncode, err) == (0, "")
+
+
+def test_a_disk_that_is_full_leaves_the_earlier_bundle(tmp_path: Path) -> None:
+    """No file may grow beyond 200 kB: the scene's page does not fit."""
+    (tmp_path / "short.py").write_text(LONG.replace("3000.0", "0.1"), encoding="utf-8")
+    with started("run", "short.py", cwd=tmp_path) as process:
+        assert process.wait(timeout=120) == 0
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); "
+    limited += "from wbplan.cli import main; sys.exit(main(['run', 'short.py']))"
+    done = subprocess.run(
+        [sys.executable, "-c", limited],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 2, done.stderr
+    assert "cannot be written" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()} == before

@@ -65,7 +65,7 @@ def _retyped(rng: random.Random, array: Any) -> Any:
     try:
         with np.errstate(all="ignore"):
             return array.astype(kind)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, RuntimeError):
         return np.zeros(array.shape, dtype="f4")
 
 
@@ -94,5 +94,6 @@ def _revalued(rng: random.Random, array: Any) -> Any:
         with np.errstate(all="ignore"):
             array[where] = array[where] * value
     else:
-        array[where] = value
+        with np.errstate(all="ignore"):
+            array[where] = value
     return array

@@ -129,7 +129,7 @@ class Worker:
         self._selector = selectors.DefaultSelector()
         assert self._process.stdout is not None
         self._selector.register(self._process.stdout, selectors.EVENT_READ)
-        said = self._line()
+        said = self._line() or self._line()
         assert said == "ready", f"the worker did not start: {said}"
         self.alive = True
         return self

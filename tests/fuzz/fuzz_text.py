@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import json
 import random
 from typing import Any
@@ -98,7 +99,7 @@ def _change_tree(rng: random.Random, root: ET.Element) -> None:
         i, j = rng.sample(range(len(element)), 2)
         element[i], element[j] = element[j], element[i]
     elif kind == 3 and len(other):
-        element.append(ET.fromstring(ET.tostring(rng.choice(list(other)))))
+        element.append(copy.deepcopy(rng.choice(list(other))))
     elif kind == 4:
         element.tag = rng.choice([other.tag, "x", "xacro:macro", "group", "mesh", "sphere", "mimic"])
     elif kind == 5 and element.attrib:

@@ -61,8 +61,8 @@ def test_what_is_imported_is_declared() -> None:
     """A package that another one happens to bring may be gone with its next release."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[><=]", line)[0].lower() for line in project["dependencies"]}
-    named_otherwise = {"pinocchio": "pin", "umsgpack": "u-msgpack-python"}
-    optional = {"IPython", "pink", "daqp", "mujoco"}  # notebooks, and the extras "bench" and "physics"
+    named_otherwise = {"pinocchio": "pin", "umsgpack": "u-msgpack-python", "mujoco": "mujoco-core"}
+    optional = {"IPython", "pink", "daqp"}  # notebooks, and the extra "bench"
     found = set()
     for path in (*(ROOT / "wbplan").rglob("*.py"), *(ROOT / "tasks").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

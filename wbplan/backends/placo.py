@@ -22,6 +22,7 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from wbplan.aims import ComTarget
+from wbplan.backends.apart import keep_apart
 from wbplan.backends.placo_ascent import PlacoAscent
 from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
 from wbplan.diagnose import solve_error
@@ -242,7 +243,7 @@ class PlacoBackend:
             step[stack.driven] = stack.driven_step
         stack.fill_box()
         step[stack.free] = np.minimum(np.maximum(step[stack.free], stack.lower), stack.upper)
-        return step
+        return step if stack.clearance is None else keep_apart(stack, step)
 
     def _aim(self) -> None:
         """Put every target where this tick's step should lead."""

@@ -21,6 +21,10 @@ from wbplan.stack import UNBOUNDED, Stack
 Array = NDArray[np.float64]
 
 
+#: Costs and gradients above this are scaled down to it where the solver found no step.
+LARGE = 1e3
+
+
 @final
 class ProxqpBackend:
     """See the module. The solver object is kept and updated; each solve starts from the last one."""
@@ -32,7 +36,7 @@ class ProxqpBackend:
         self._guess = ActiveSetGuess(stack)
         self._cascade = Cascade(stack) if len(stack.levels) > 1 else None
         self._qp = self._new_solver()
-        self._started = False
+        self._started, self._scale = False, 1.0
         self._unbounded = np.full(len(stack.d), -UNBOUNDED)
         self._rest = np.zeros(stack.phase.model.nv)
 
@@ -42,6 +46,8 @@ class ProxqpBackend:
         qp.settings.eps_abs = 1e-8
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
+        # Steps are millimetres: its usual measure takes rows that nearly agree for contradictions.
+        qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = 1e-14
         qp.settings.max_iter = qp.settings.max_iter_in = 200  # inner ones go to 1500 for each outer otherwise
         qp.settings.check_duality_gap = False
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
@@ -65,32 +71,42 @@ class ProxqpBackend:
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
-        if not (self._run() or self._retry() or (self._wait_for_margin() and self._retry())):
+        if not (self._run() or self._retry() or (s.relax() and self._retry())):
             raise solve_error(s, "the QP has no solution")
         results, rows = self._qp.results, len(s.d)
-        found = Multipliers(np.array(results.y), np.array(results.z[:rows]), np.array(results.z[rows:]))
+        y, z = self._scale * np.array(results.y), self._scale * np.array(results.z)
+        found = Multipliers(y, z[:rows], z[rows:])
         self._guess.learn(found)
         return np.array(results.x), found
 
     def _run(self) -> bool:
-        s, qp = self._stack, self._qp
+        s = self._stack
+        if not self._started:
+            self._qp, self._scale = self._new_solver(), 1.0
+        qp = self._qp
         if self._started:
             qp.update(s.H, s.g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
         else:
             qp.init(s.H, s.g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
             self._started = True
-        qp.solve()
-        # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
-        return bool(qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
+        return self._solved()
 
-    def _wait_for_margin(self) -> bool:
-        """Ask a CoM that is outside its margin only not to go further out; False where none is."""
-        outside = bool((self._stack.d < 0.0).any())
-        np.maximum(self._stack.d, 0.0, out=self._stack.d)
-        return outside
+    def _solved(self) -> bool:
+        self._qp.solve()
+        # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
+        return bool(self._qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
 
     def _retry(self) -> bool:
-        """Once more from nothing, with patience: a warm start may be a bad one."""
-        self._qp, self._started = self._new_solver(), False
-        self._qp.settings.max_iter = 1000
-        return self._run()
+        """Once more from nothing, with patience, and slow to call it infeasible.
+
+        Far targets and large weights make costs that no absolute tolerance fits: those are scaled.
+        """
+        s = self._stack
+        qp = self._qp = self._new_solver()
+        self._started = False  # the next tick begins anew: this solver's patience is not for every tick
+        qp.settings.max_iter = 1000
+        qp.settings.eps_primal_inf = 1e-12
+        self._scale = max(1.0, float(np.abs(s.g).max()) / LARGE, float(np.abs(s.H).max()) / LARGE)
+        H, g = s.H / self._scale, s.g / self._scale
+        qp.init(H, g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)
+        return self._solved()

@@ -13,6 +13,7 @@ from pathlib import Path
 from rich.console import Console
 
 from wbplan.bench.breakdown import breakdown_table
+from wbplan.bench.clearance import clearance_text
 from wbplan.bench.forces import forces_table
 from wbplan.bench.levels import levels_text
 from wbplan.bench.race import COLD, ROUND, race
@@ -47,6 +48,7 @@ def main(args: Sequence[str] | None = None) -> int:
             laps = race(scene, solvers)
             console.print(table_of(name, laps, missing))
             console.print(levels_text(scene))
+            console.print(clearance_text(scene))
             console.print()
             rows += rows_of(name, laps)
             same_work &= not any(lap.faults for lap in laps)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.bundle import places
 from wbplan.errors import BundleError
 
 PLAN, URDF, ARRAYS, TABLE = "plan.json", "robot.urdf", "trajectory.npz", "trajectory.csv"
@@ -43,15 +44,18 @@ def write_folder(
         BundleError: the target is not absent, empty or a bundle, or cannot be written.
     """
     target = _refuse_foreign(folder, overwrite)
-    new = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.part")
+    new = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}{places.PART}")
     made: list[Path] = []
     try:
         _make_folders(target.parent, made)
+        places.sweep(target)
         new.mkdir()
-        for name, write in writers.items():
-            write(new / name)
-        _take_over(target, new)
-        _swap(new, target)
+        with places.locked(new):
+            for name, write in writers.items():
+                write(new / name)
+            with places.locked(target.parent):  # two runs into one folder: the later one stays
+                _take_over(target, new)
+                _swap(new, target)
     except OSError as error:
         _remove(new, target, made)
         raise BundleError(f"{folder}: cannot be written: {error.strerror or error}") from error
@@ -97,7 +101,8 @@ def _take_over(old: Path, new: Path) -> None:
     if not old.is_dir():
         return
     for path in old.iterdir():
-        if path.name in FILES or (new / path.name).exists():
+        unfinished = path.name.startswith(".") and path.suffix == places.PART
+        if path.name in FILES or unfinished or (new / path.name).exists():
             continue
         if path.is_dir() and not path.is_symlink():
             shutil.copytree(path, new / path.name, symlinks=True)
@@ -106,9 +111,12 @@ def _take_over(old: Path, new: Path) -> None:
 
 
 def _swap(new: Path, target: Path) -> None:
-    """Rename the new folder into place; the old one is put back if that fails."""
+    """Put the new folder into place; where that takes two steps, the old one is put back if they fail."""
     if not target.exists():
         new.rename(target)
+        return
+    if places.exchange(new, target):
+        shutil.rmtree(new, ignore_errors=True)
         return
     old = _aside(new)
     try:
@@ -125,7 +133,7 @@ def _swap(new: Path, target: Path) -> None:
 
 def _aside(new: Path) -> Path:
     """Where the replaced folder waits until the new one is in place."""
-    return new.with_suffix(".old")
+    return new.with_suffix(places.OLD)
 
 
 def _remove(new: Path, target: Path, made: list[Path]) -> None:

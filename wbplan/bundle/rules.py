@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbplan.bundle.urdf import require_readable
 from wbplan.errors import BundleError, SpecError, listing
 from wbplan.obstacles import Obstacle, from_record
 
@@ -50,6 +51,7 @@ def model_of(urdf: str, where: str) -> Any:
     Raises:
         BundleError: Pinocchio cannot build it.
     """
+    require_readable(urdf, where)
     try:
         return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError, TypeError) as error:
@@ -146,6 +148,14 @@ def _difference(found: Sequence[str], expected: Sequence[str]) -> str:
 # --------------------------------------------------------------------------------------------- plan.json
 
 
+def _sayable(text: str) -> bool:
+    """Whether a text can be written: JSON also takes halves of characters."""
+    try:
+        return bool(text.encode("utf-8")) or not text
+    except UnicodeEncodeError:
+        return False
+
+
 @dataclass(frozen=True)
 class _Field:
     """A JSON value and where it stands; its methods return it as what it has to be, or refuse it."""
@@ -176,7 +186,7 @@ class _Field:
         return (_Field(item, f"{self.where}[{i}]") for i, item in enumerate(self.value))
 
     def text(self) -> str:
-        if not isinstance(self.value, str):
+        if not isinstance(self.value, str) or not _sayable(self.value):
             raise self.fail("text")
         return self.value
 
@@ -221,6 +231,10 @@ def check_plan(plan: Mapping[str, Any], model: Any, where: str) -> None:
         raise root["dt"].fail("a number above 0")
     if not isinstance(root["report"].value, Mapping):
         raise root["report"].fail("an object")
+    for pair in root["ignored_pairs"].items() if "ignored_pairs" in root else ():
+        _check_pair(pair)
+    for foot in root["feet"].items() if "feet" in root else ():
+        foot.frame(model)
     for note in root["why"].items() if "why" in root else ():
         if not isinstance(note.value, Mapping):
             raise note.fail("an object")
@@ -284,6 +298,7 @@ def _check_phase(phase: _Field, model: Any) -> None:
         task["name"].text()
     if "clearance" in phase:
         phase["clearance"].number()
+    _check_kept_apart(phase)
     for push in phase["pushes"].items() if "pushes" in phase else ():
         push["frame"].frame(model)
         push["force"].vector(3)
@@ -292,6 +307,27 @@ def _check_phase(phase: _Field, model: Any) -> None:
             phase[key].number(0.0)
     for corner in phase["region"].items(least=3) if "region" in phase else ():
         corner.vector(2)
+
+
+def _check_kept_apart(phase: _Field) -> None:
+    if "kept_apart" not in phase:
+        return
+    told = phase["kept_apart"]
+    for key in ("self", "obstacles"):
+        if told[key].value is not None:
+            told[key].number(0.0)
+    for pair in told["closer"].items():
+        _check_pair(pair)
+    for item in told["may_touch"].items():
+        if isinstance(item.value, str):
+            item.text()
+        else:
+            _check_pair(item)
+
+
+def _check_pair(pair: _Field) -> None:
+    if len([name.text() for name in pair.items()]) != 2:
+        raise pair.fail("two names")
 
 
 def check_cover(plan: Mapping[str, Any], motion: Trajectory, where: str) -> None:

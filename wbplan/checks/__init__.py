@@ -6,10 +6,13 @@ Nothing here knows how a plan is made: the robot is rebuilt from the bundle's ow
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
 from wbplan.bundle import Bundle
-from wbplan.checks import balance, contacts, forces, joints, objects
+from wbplan.checks import balance, clearance, contacts, forces, joints, objects
 from wbplan.checks.replay import Replay
 from wbplan.checks.report import CheckReport, Row, Tolerances
 
@@ -23,6 +26,7 @@ def check(
     closure: float = 1e-4,
     rotation: float = 1e-3,
     ground: float = 1e-4,
+    folders: Sequence[str | Path] = (),
 ) -> CheckReport:
     """Recompute every promise of a bundle at every sample.
 
@@ -34,6 +38,7 @@ def check(
         closure: how far a closed loop, or an object in its holder, may open [m].
         rotation: how far it may turn [rad].
         ground: how far contacts of one level may differ in height [m].
+        folders: where the robot's meshes are looked for, if it has any.
 
     Returns:
         One row a promise with its worst value, when and where it fell; promises that no phase makes
@@ -50,4 +55,5 @@ def check(
             replay = Replay.of(bundle)
             for rules in (joints.rows, contacts.rows, balance.rows, forces.rows, objects.rows):
                 rows.extend(rules(replay, bounds))
+            rows.extend(clearance.rows(bundle, replay, tuple(Path(folder) for folder in folders)))
     return CheckReport(tuple(rows))

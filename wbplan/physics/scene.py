@@ -205,6 +205,8 @@ def _add_objects(spec: Any, bundle: Bundle, motion: Motion, floor: float, option
         if name not in motion.objects or not item["mass"] > 0.0:
             continue
         inertia = pin.Inertia.FromBox(item["mass"], *item["size"]).inertia
+        if spec.body(name) is not None:
+            raise PhysicsError(f"plan.json: object '{name}' is called as a link or another object is")
         body = spec.worldbody.add_body(name=name, explicitinertial=True)
         body.mass, body.inertia = item["mass"], np.diag(inertia)
         body.ipos = _com_of(bundle, name)

@@ -88,6 +88,13 @@ def parse_xml(text: str) -> Element:
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
     parser.EntityDeclHandler = refuse
+
+    def declared(version: str, encoding: str | None, standalone: int) -> None:
+        # The text was read as UTF-8, whatever it says; other readers would believe what it says.
+        if encoding and encoding.lower() not in ("utf-8", "utf8", "us-ascii", "ascii"):
+            raise XmlError(f"declares the encoding '{brief(encoding)}', expected UTF-8")
+
+    parser.XmlDeclHandler = declared
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
