@@ -55,7 +55,7 @@ def script(
         lift: how high feet rise [m]; a tenth of the body's height where not given.
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
-        margin: stability margin kept throughout [m]; 0.6 of the largest where not given.
+        margin: stability margin kept throughout [m]; half of the largest where not given.
         friction: of the feet on the ground [-].
     """
     walker = wb.gaits.Walker(robot)

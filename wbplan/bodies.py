@@ -108,12 +108,15 @@ class Carried:
         grip: a second frame that clamps it.
         pads: frames that press on it, as a gripper's fingers do, by whose friction a simulation holds it;
             where not given, the holder and whatever forms a closed loop with it.
+        squeeze: force [N] with which each pad presses in a simulation; by default what friction needs to
+            hold the weight, and some more.
     """
 
     body: Body
     by: str
     pose: Any = field(default=AS_IS, compare=False)
     pads: tuple[str, ...] = ()
+    squeeze: float | None = None
     grip: Grip | None = None
 
     def __post_init__(self) -> None:
@@ -127,6 +130,9 @@ class Carried:
             raise SpecError(f"Carried '{self.body.name}'.pads: expected a list of frames, got {given!r}")
         pads = tuple(name_of(pad, f"Carried '{self.body.name}'.pads") for pad in given)
         object.__setattr__(self, "pads", pads)
+        if self.squeeze is not None:
+            at = f"Carried '{self.body.name}'.squeeze"
+            object.__setattr__(self, "squeeze", number(self.squeeze, at, "newtons of 0 or more", least=0.0))
         if not isinstance(self.pose, AsIs):
             object.__setattr__(self, "pose", _pose(self.pose, f"Carried '{self.body.name}'.pose"))
 
@@ -141,6 +147,7 @@ class Held:
     T_holder_body: Any
     frame: int
     pads: tuple[str, ...] = ()
+    squeeze: float | None = None
     grip: Grip | None = None
 
 
@@ -207,7 +214,7 @@ def with_carried(
         inertia = pin.Inertia.FromBox(body.mass, x, y, z) if body.mass > 0 else pin.Inertia.Zero()
         inertia.lever = np.array(body.com)
         frame = pin.Frame(body.name, holder.parentJoint, by, placement, pin.FrameType.BODY)
-        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads, item.grip))
+        held.append(Held(body, item.by, pose, model.addFrame(frame), item.pads, item.squeeze, item.grip))
         model.appendBodyToJoint(holder.parentJoint, inertia, placement)
     return model, tuple(held)
 

@@ -138,6 +138,7 @@ class Recorder:
                         "mass": h.body.mass,
                         "com": list(h.body.com),
                         **({"pads": list(h.pads)} if h.pads else {}),
+                        **({"press": h.squeeze} if h.squeeze is not None else {}),
                     }
                     for h in loop.compiled.held
                 ],

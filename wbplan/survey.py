@@ -45,8 +45,8 @@ class Walked:
         duty: duty factor.
         steps: in a cycle.
         speed: of the gait, v = s n / (T u) with the longest stance's stroke [m/s].
-        measured: mean speed of the centre of mass half-way [m/s], over a cycle where it goes two, else over
-            a step.
+        measured: mean speed of the centre of mass half-way [m/s], its sway taken out; over a cycle where it
+            goes two, else over a step.
         distance: asked [m].
         gone: by the body [m].
         centre: least margin of the body's middle over the steps, standing [m].
@@ -136,7 +136,7 @@ def measured(
         gait.speed(stroke, gait.cycle * beat, longest=True),
         _speed_at(
             trajectory.time,
-            trajectory.com,
+            _without_sway(walked, planned),
             first + 0.5 * course.duration,
             beat * (gait.cycle if whole else 1.0),
         ),
@@ -153,12 +153,19 @@ def measured(
     )
 
 
+def _without_sway(walked: Walk, planned: Plan) -> Array:
+    """The centre of mass (N, 2) [m] less what it is meant to sway by."""
+    trajectory, spline = planned.trajectory, walked.com.spline
+    places: Array = trajectory.com[:, :2]
+    return places if spline is None else places - np.asarray(spline(trajectory.time))
+
+
 def _speed_at(time: Array, com: Array, moment: float, window: float) -> float:
     """Mean speed [m/s] in the plane over a window about a moment."""
     early, late = (int(np.argmin(np.abs(time - t))) for t in (moment - window / 2, moment + window / 2))
     if early == late:
         raise SpecError("survey: a step is shorter than a tick")
-    return float(np.linalg.norm(com[late, :2] - com[early, :2]) / (time[late] - time[early]))
+    return float(np.linalg.norm(com[late] - com[early]) / (time[late] - time[early]))
 
 
 def clearance(walked: Walk, planned: Plan, ground: float = 0.0) -> float:

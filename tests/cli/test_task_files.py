@@ -26,6 +26,8 @@ HEAD = '"""A task."""\nimport wbplan as wb\nROBOT = "legarm_hexapod"\n'
         (HEAD + "raise SystemExit(0)\n", ["task.py, line 4", "SystemExit"]),
         ("def script(robot): ...\n", ["task.py", 'ROBOT = "name of a robot"']),
         ("ROBOT = 3\ndef script(robot): ...\n", ["task.py", "ROBOT", "3"]),
+        (HEAD + "ROBOTS = 'mana'\ndef script(robot): ...\n", ["task.py: ROBOTS", "any", "'mana'"]),
+        (HEAD + "ROBOTS = ('mana', 3)\ndef script(robot): ...\n", ["task.py: ROBOTS", "3"]),
         (HEAD, ["task.py", "def script(robot"]),
         (HEAD + "script = 5\n", ["task.py", "def script(robot"]),
         (HEAD + "def script(): ...\n", ["task.py", "robot as its first argument"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wbplan.papers import zheng, zheng_case
+from wbplan.papers import zheng, zheng_case, zheng_switch
 
 from .conftest import Judge
 
@@ -45,3 +45,7 @@ def test_figure_16_stability_radii(judge: Judge) -> None:
     rows = judge(zheng.figure_16())
     assert rows["distance from the centre to the best point"].ours == pytest.approx(0.381966, abs=1e-6)
     assert rows["four of five legs, best point"].ours == pytest.approx(0.5590, abs=1e-4)
+
+
+def test_figures_14_15_19_the_change_of_gait(judge: Judge) -> None:
+    judge(zheng_switch.switching())

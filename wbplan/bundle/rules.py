@@ -289,7 +289,7 @@ def _check_phase(phase: _Field, model: Any) -> None:
             raise item["pose"].fail("x y z and a quaternion qx qy qz qw of length 1")
         if "com" in item:
             item["com"].vector(3)
-        for key in ("friction", "patch", "squeeze"):
+        for key in ("friction", "patch", "squeeze", "press"):
             if key in item:
                 item[key].number(0.0)
         for pad in item["pads"].items() if "pads" in item else ():

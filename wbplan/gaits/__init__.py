@@ -5,11 +5,13 @@ from wbplan.gaits.figures import cycle_figure
 from wbplan.gaits.gait import Gait
 from wbplan.gaits.ground import firm, over
 from wbplan.gaits.library import crawls, gait_named, gaits_of, pentagon, pentapod, quadrangular, tripod, wave
+from wbplan.gaits.manipulation import SHIFT, WithBody, beside_way, nominal, shifts
 from wbplan.gaits.margins import best_margin, cycle_margins, possible, regular_stance, require, step_margins
 from wbplan.gaits.reach import comfortable, room, roomiest, shares
 from wbplan.gaits.schedule import Beat, Course, Schedule, Step, beats_of, course_of, flat, schedule
 from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stance, Walker, mode_named
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
+from wbplan.gaits.switch import Switch, Unfolding, perform
 from wbplan.gaits.tracks import Track, arc, on_the_spot, straight, through
 from wbplan.gaits.walking import gait_for, walk
 
@@ -19,6 +21,7 @@ __all__ = [
     "MIXED_I",
     "MIXED_II",
     "MODES",
+    "SHIFT",
     "Beat",
     "CosineSwing",
     "Course",
@@ -30,11 +33,15 @@ __all__ = [
     "Schedule",
     "Stance",
     "Step",
+    "Switch",
     "Track",
+    "Unfolding",
     "Walk",
     "Walker",
+    "WithBody",
     "arc",
     "beats_of",
+    "beside_way",
     "best_margin",
     "build",
     "comfortable",
@@ -48,10 +55,12 @@ __all__ = [
     "gait_named",
     "gaits_of",
     "mode_named",
+    "nominal",
     "on_the_spot",
     "over",
     "pentagon",
     "pentapod",
+    "perform",
     "possible",
     "quadrangular",
     "regular_stance",
@@ -60,6 +69,7 @@ __all__ = [
     "roomiest",
     "schedule",
     "shares",
+    "shifts",
     "step_margins",
     "straight",
     "through",

@@ -31,7 +31,7 @@ Fields = Callable[[Step], Mapping[str, Any]]
 SwingMaker = Callable[[Array, Array, float, float], QuinticSwing | CosineSwing]
 
 #: Share of the largest margin that is asked for where none is given.
-USUAL = 0.6
+USUAL = 0.5
 #: Moments of a swing at which its height over the ground is looked at.
 LOOKS = 61
 
@@ -46,7 +46,7 @@ class Manner:
             allow where not given.
         height: how high feet are lifted over the higher end of their way [m].
         clearance: least height of a foot over the ground in the middle half of its way [m].
-        margin: stability margin kept all through [m]; 0.6 of the largest where not given.
+        margin: stability margin kept all through [m]; half of the largest where not given.
         friction: of the feet on the ground [-].
         speed: share of the joints' speed limits that may be used.
         follow: how much of the mean height of its footholds the body goes up and down with, 0 to 1.

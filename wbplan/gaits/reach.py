@@ -92,7 +92,9 @@ def _joints(walker: Walker, leg: str, q: Array) -> Array:
     return np.array([q[walker.robot.joint_index(joint)[0]] for joint in walker.closed[leg].joints])
 
 
-def room(walker: Walker, stance: Stance, lift: float, heading: float | None = None) -> float:
+def room(
+    walker: Walker, stance: Stance, lift: float, heading: float | None = None, wanted: float = 0.0
+) -> float:
     """The longest stroke [m] that every leg can make about its stance, on the ground and lifted in between.
 
     Args:
@@ -100,6 +102,7 @@ def room(walker: Walker, stance: Stance, lift: float, heading: float | None = No
         stance: of the feet.
         lift: height of the swing [m].
         heading: of the stroke in the body [rad]; of any where not given.
+        wanted: less than that [m] is told as 0, which is sooner found out.
     """
     headings = [heading] if heading is not None else list(np.arange(4) * np.pi / 4.0)
     least = 2.0 * stance.height
@@ -108,14 +111,15 @@ def room(walker: Walker, stance: Stance, lift: float, heading: float | None = No
             continue
         for angle in headings:
             ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
-            least = min(
-                least, _stroke(walker.closed[leg], np.array([*foot, -stance.height]), ahead, lift, least)
-            )
+            place = np.array([*foot, -stance.height])
+            least = _stroke(walker.closed[leg], place, ahead, lift, least, min(wanted, least))
+            if least <= 0.0:
+                return 0.0
     return least
 
 
-def _stroke(leg: Any, foot: Array, ahead: Array, lift: float, most: float) -> float:
-    """The longest stroke of one leg in one direction, `most` [m] at most, by bisection."""
+def _stroke(leg: Any, foot: Array, ahead: Array, lift: float, most: float, wanted: float) -> float:
+    """The longest stroke of one leg in one direction, `most` [m] at most, by bisection; 0 below `wanted`."""
     times = np.linspace(0.0, 1.0, 17)
 
     def fits(stroke: float) -> bool:
@@ -128,7 +132,9 @@ def _stroke(leg: Any, foot: Array, ahead: Array, lift: float, most: float) -> fl
 
     if fits(most):
         return most
-    low, high = 0.0, most
+    if not fits(wanted):
+        return 0.0
+    low, high = wanted, most
     for _ in range(8):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if fits(middle) else (low, middle)
@@ -143,9 +149,13 @@ def roomiest(walker: Walker, stance: Stance, lift: float) -> Stance:
         stance: of the feet.
         lift: height of the swing [m].
     """
-    heights = stance.height * np.arange(0.8, 1.31, 0.05)
-    found = [(room(walker, Stance(stance.feet, float(h)), lift), float(h)) for h in heights]
-    return Stance(stance.feet, max(found)[1])
+    best, most = stance, 0.0
+    for height in stance.height * np.arange(0.8, 1.31, 0.05):
+        tried = Stance(stance.feet, float(height))
+        stroke = room(walker, tried, lift, wanted=most)
+        if stroke > most:
+            best, most = tried, stroke
+    return best
 
 
 def comfortable(walker: Walker, stance: Stance, lift: float, *, adjust: bool = True) -> tuple[Stance, float]:

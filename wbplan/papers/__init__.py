@@ -17,6 +17,7 @@ from wbplan.papers import (
     zheng,
     zheng_case,
     zheng_gaits,
+    zheng_switch,
     zhuang,
     zhuang_gaits,
 )
@@ -26,7 +27,7 @@ __all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
 
 PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES + mana_simulated.TABLES,
-    "zheng": zheng.TABLES + zheng_case.TABLES + zheng_gaits.TABLES,
+    "zheng": zheng.TABLES + zheng_case.TABLES + zheng_gaits.TABLES + zheng_switch.TABLES,
     "hexpiderix": hexpiderix.TABLES,
     "hiphant": hiphant.TABLES + hiphant_motion.TABLES,
     "zhuang": zhuang.TABLES + zhuang_gaits.TABLES,

@@ -34,7 +34,8 @@ class Span:
         pads: the frames that press on it; one where it is not clamped.
         friction: of the pads, where the plan says it.
         holder: the frame that the plan fastens it to.
-        squeeze: [N] of each pad, where the plan says it.
+        squeeze: force of each pad [N], where the plan says it.
+        fingers: the plan names the pads.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Span:
     friction: float | None
     holder: str
     squeeze: float | None = None
+    fingers: bool = False
 
 
 @final
@@ -194,8 +196,10 @@ def _spans(bundle: Bundle) -> tuple[Span, ...]:
             if last is not None and abs(last.end - start) < 1e-6 and set(last.pads) == set(pads):
                 spans[spans.index(last)] = replace(last, end=end)
             else:
-                friction, squeeze = item.get("friction"), item.get("squeeze")
-                spans.append(Span(item["name"], start, end, pads, friction, item["frame"], squeeze))
+                friction, squeeze = item.get("friction"), item.get("squeeze", item.get("press"))
+                fingers = bool(item.get("pads"))
+                held = Span(item["name"], start, end, pads, friction, item["frame"], squeeze, fingers)
+                spans.append(held)
     return tuple(spans)
 
 

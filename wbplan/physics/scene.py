@@ -25,6 +25,7 @@ Ids = NDArray[np.int64]
 
 NEAR = 0.01  #: a shape whose surface is this near to a tip's frame [m] belongs to the tip
 SMALL_FOOT = 0.003  #: radius [m] of the ball that a foot without a shape gets
+RIM = 0.02  #: how far a stand reaches out [m] under what stands on it
 
 
 @final
@@ -135,6 +136,8 @@ def scene_of(
                 grip = grip_of(span, motion.friction, options)
                 spec.geom(name).friction = [grip, grip * options.patch, 0.0001]
                 spec.geom(name).condim = 4
+                if span.fingers:  # MuJoCo's usual contact gives way by half a millimetre to a light object
+                    spec.geom(name).solref = [2.0 * options.dt, 1.0]
     floor = add_ground(spec, motion, bundle.obstacles)
     _add_objects(spec, bundle, motion, floor, options)
     pins = _add_pins(spec, motion, options)
@@ -222,7 +225,7 @@ def _add_objects(spec: Any, bundle: Bundle, motion: Motion, floor: float, option
             if lowest - max(floor, Terrain(bundle.obstacles).height(pose[0], pose[1])) > FLAT:
                 spec.worldbody.add_geom(
                     name=f"{name}_stand{number}", type=mj.mjtGeom.mjGEOM_BOX, friction=ground, condim=3,
-                    size=[*(np.array(item["size"][:2]) / 2.0), TREAD / 2.0],
+                    size=[*(np.array(item["size"][:2]) / 2.0 + RIM), TREAD / 2.0],
                     pos=[pose[0], pose[1], lowest - TREAD / 2.0], contype=STAND, conaffinity=0,
                 )  # fmt: skip
 
