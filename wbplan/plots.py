@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pinocchio as pin
@@ -85,8 +85,7 @@ def png(drawing: Figure) -> bytes:
     """A figure as the bytes of a PNG file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    file = io.BytesIO()
-    canvas: Any = FigureCanvasAgg(drawing)
+    file, canvas = io.BytesIO(), cast(Any, FigureCanvasAgg(drawing))
     with warnings.catch_warnings():  # labels of absurd numbers leave no room
         warnings.simplefilter("ignore", UserWarning)
         canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
