@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.bodies import frame_number
@@ -14,6 +15,7 @@ from wbplan.geometry import HalfPlanes
 from wbplan.objectives import KINDS, BalanceTask, ManipulabilityTask
 from wbplan.paths import POINT, Path
 from wbplan.script import Phase
+from wbplan.state import State
 
 Array = NDArray[np.float64]
 
@@ -64,20 +66,22 @@ class ComTarget:
 
 
 def balance_target(
-    task: BalanceTask, region: HalfPlanes, com: Array, velocity: Array, level: int
+    task: BalanceTask, region: HalfPlanes, state: State, velocity: Array | None, level: int
 ) -> ComTarget:
     """The CoM on its way to the middle of the region's best places, at its own height.
 
     Args:
         task: the task.
         region: of the CoM's places that the contacts hold.
-        com: (3,) [m] at the phase's start.
-        velocity: (3,) [m/s] of the CoM then.
+        state: at the phase's start.
+        velocity: (nv,) then; None at rest.
         level: of the task.
     """
-    goal = np.array(com)
+    goal, drift = np.array(state.com), np.zeros(3)
+    if velocity is not None:
+        drift[:2] = (pin.jacobianCenterOfMass(state.model, state.model.createData(), state.q) @ velocity)[:2]
     goal[:2] = region.middle()
-    path = Settle(com, velocity * (1.0, 1.0, 0.0), goal, task.settle)
+    path = Settle(state.com, drift, goal, task.settle)
     return ComTarget(task.label, path, task.weight * np.array([1.0, 1.0, 0.0]), task.gain, False, level)
 
 

@@ -132,6 +132,7 @@ def compile_phase(
     placed: Mapping[str, Any] | None = None,
     roles: Mapping[str, str | None] | None = None,
     bodies: Sequence[Body] = (),
+    velocity: Array | None = None,
 ) -> CompiledPhase:
     """Look up every name of a phase and bind its targets to a start configuration.
 
@@ -142,6 +143,7 @@ def compile_phase(
         placed: pose in the world of every body that stands somewhere, by name.
         roles: the role that each limb is in; by default read off `q`.
         bodies: the script's; those in `placed` that are not carried stand in the way.
+        velocity: (nv,) at the phase's start, which a balance task's target leaves with; at rest.
 
     Raises:
         SpecError: a name does not exist, or two parts of the phase do not fit.
@@ -172,7 +174,7 @@ def compile_phase(
         if isinstance(t, ComTask)
     )
     if polygon is not None:
-        coms += tuple(balance_target(t, polygon, state.com, np.zeros(3), level[id(t)]) for t in balance)
+        coms += tuple(balance_target(t, polygon, state, velocity, level[id(t)]) for t in balance)
     joints = tuple(
         _joint_target(robot, t, q, given, t in phase.hard, level.get(id(t), 0), at)
         for t in phase.tasks

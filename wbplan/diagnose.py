@@ -35,7 +35,7 @@ def least_relaxation(stack: Stack) -> tuple[Array, Array, Array]:
     upper = np.concatenate([stack.upper, np.full(m + e, 1e20)])
     qp = proxsuite.proxqp.dense.QP(size, m, e, True)
     qp.settings.eps_abs = 1e-10
-    qp.settings.max_iter, qp.settings.max_iter_in = 1000, 200
+    qp.settings.max_iter, qp.settings.max_iter_in = 200, 50
     qp.init(H, np.zeros(size), A, stack.b, C, np.full(e, -1e20), stack.d, lower, upper)
     qp.solve()
     x = np.array(qp.results.x)

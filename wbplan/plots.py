@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import NO_MARGIN, Bundle
 from wbplan.errors import BundleError, SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.measures import draw_measures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SIZE = (15.0, 11.0)  #: [inch]
-DPI = 110
+SIZE, DPI = (15.0, 11.0), 110  #: [inch], dots an inch
 TIME = "viridis"  #: colour map of time
 INK, FAINT, BOUND = "#22303c", "#8a97a3", "#c0392b"
 MOST_LINES = 8  #: tasks with a line of their own in a panel
@@ -70,11 +70,11 @@ def figure(bundle: Bundle) -> Figure:
     joints = len(bundle.trajectory.joint_names)
     right = columns[1].subgridspec(4, 1, height_ratios=[1.25, 1.1, 1.1, min(2.6, 0.8 + 0.075 * joints)])
     _top_view(drawing, drawing.add_subplot(left[0]), bundle)
-    place = drawing.add_subplot(left[1])
-    _base(place, drawing.add_subplot(left[2], sharex=place), bundle)
+    _base(place := drawing.add_subplot(left[1]), drawing.add_subplot(left[2], sharex=place), bundle)
     margin = drawing.add_subplot(right[0])
     panels = [drawing.add_subplot(right[i], sharex=margin) for i in (1, 2, 3)]
     _margin(margin, bundle)
+    draw_measures(margin, bundle)
     _errors(panels[0], bundle, ("position",), "m")
     _errors(panels[1], bundle, ("orientation", "joints"), "rad")
     _joints(drawing, panels[2], bundle)

@@ -120,6 +120,15 @@ def test_contacts_are_one_line(machine: ModuleType, good: Bundle) -> None:
     np.testing.assert_allclose(worst[:, 1], [2e-6] * 9 + [3e-6] * (size - 9))
 
 
+def test_the_manipulability_has_a_line_on_its_own_scale(machine: ModuleType, good: Bundle) -> None:
+    w = np.linspace(6.75, 7.19, len(good.trajectory))
+    w[:3] = np.nan
+    drawing = plots.figure(machine.edited(good, measures={"manipulability(arm_tip).manipulability": w}))
+    assert f"w, arm_tip:\n{w[3]:.3g} to 7.19" in texts(drawing)
+    drawn = [line.get_ydata() for axes in drawing.axes for line in axes.get_lines()]
+    assert any(len(y) == len(w) and np.array_equal(y, w, equal_nan=True) for y in drawn)
+
+
 def test_many_phases_keep_their_names_apart(machine: ModuleType, good: Bundle) -> None:
     time = good.trajectory.time
     starts = np.arange(0, 70, 3)

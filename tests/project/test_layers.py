@@ -51,6 +51,7 @@ LAYERS = [
     "fallback",
     "bundle",
     "checks",
+    "measures",
     "plots",
     "forceplots",
     "view",

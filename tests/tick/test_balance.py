@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbplan as wb
 from wbplan.aims import Settle
+from wbplan.compiled import compile_phase
 from wbplan.geometry import support_polygon
 
 FEET = ["rf_foot", "lf_foot", "rr_foot", "lr_foot"]
@@ -56,6 +58,18 @@ def test_the_weight_is_a_com_tasks(hiphant: wb.Robot) -> None:
         a, b = balance.step(), by_hand.step()
         np.testing.assert_allclose(a.q, b.q, atol=1e-9)
         assert a.errors["balance.position"] == pytest.approx(b.errors["balance.position"], abs=1e-9)
+
+
+def test_the_target_leaves_with_the_velocity_that_the_phase_begins_with(hiphant: wb.Robot) -> None:
+    start, model = hiphant.state("ready"), hiphant.model
+    velocity = np.random.default_rng(0).normal(scale=0.1, size=model.nv)
+    compiled = compile_phase(hiphant, stand(FEET, wb.BalanceTask()), start.q, velocity=velocity)
+    (target,) = compiled.com_targets
+    step = 1e-6
+    moved = wb.State(model, pin.integrate(model, start.q, step * velocity))
+    expected = (moved.com - start.com) / step * (1.0, 1.0, 0.0)
+    np.testing.assert_allclose((target.path.at(step) - target.path.at(0.0)) / step, expected, atol=1e-5)
+    np.testing.assert_allclose(target.path.at(0.0), start.com, atol=1e-12)
 
 
 finite = st.floats(-2.0, 2.0)

@@ -104,7 +104,7 @@ class ProxqpBackend:
         s = self._stack
         qp = self._qp = self._new_solver()
         self._started = False  # the next tick begins anew: this solver's patience is not for every tick
-        qp.settings.max_iter = 1000
+        qp.settings.max_iter, qp.settings.max_iter_in = 200, 50  # or rows that clash keep it for minutes
         qp.settings.eps_primal_inf = 1e-12
         self._scale = max(1.0, float(np.abs(s.g).max()) / LARGE, float(np.abs(s.H).max()) / LARGE)
         H, g = s.H / self._scale, s.g / self._scale
