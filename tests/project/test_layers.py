@@ -55,6 +55,7 @@ LAYERS = [
     "checks",
     "measures",
     "plots",
+    "forceplots",
     "view",
     "physics",
     "reasons",
