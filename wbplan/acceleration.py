@@ -61,7 +61,7 @@ def limb_inertia(model: Any) -> Array:
 
 @lru_cache(maxsize=4)
 def _own_limbs(robot: Robot) -> Array:
-    """`limb_inertia` of a robot that carries nothing: asked for every phase of a plan, and the same in each."""
+    """`limb_inertia` of a robot that carries nothing: the same in every phase of a plan."""
     return limb_inertia(robot.model)
 
 

@@ -75,7 +75,7 @@ def _judge(
     solved: Any, A: Any, b: Any, C: Any, d: Any, lower: Any, upper: Any, sides: Any, rows: Any,
     z_box: Any, z_rows: Any, rounding: float,
 ) -> int:  # fmt: skip
-    """SOLVED, with the multipliers written; or REVISED, with `sides` and `rows` as they are to be tried next."""
+    """SOLVED, with the multipliers written; or REVISED, with `sides` and `rows` to be tried next."""
     n, m = lower.shape[0], b.shape[0]
     for r in range(m):
         residual = -b[r]

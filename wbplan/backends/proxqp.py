@@ -1,8 +1,8 @@
 """The stack's own matrices, solved: the default backend.
 
 Where the bounds that were active last tick lead to this tick's, a few linear solves find the step. If not,
-daqp is asked, which is exact and quick to say that there is none; then ProxQP, which accepts redundant hard rows
-and problems that are badly scaled. The multipliers say what holds the robot back.
+daqp is asked, which is exact and quick to say that there is none; then ProxQP, which accepts redundant hard
+rows and problems that are badly scaled. The multipliers say what holds the robot back.
 """
 
 from __future__ import annotations
