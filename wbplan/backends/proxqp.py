@@ -1,8 +1,7 @@
-"""The stack's own matrices, solved: the default backend.
+"""ProxQP on the stack's own matrices: the default backend.
 
-Where the bounds that were active last tick lead to this tick's, a few linear solves find the step. If not,
-daqp is asked, which is exact and quick to say that there is none; then ProxQP, which accepts redundant hard
-rows and problems that are badly scaled. The multipliers say what holds the robot back.
+It accepts redundant hard rows, which closed loops make, and its multipliers say what holds the robot back.
+Where the bounds that were active last tick are active again, one linear solve finds the same step.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import proxsuite
 from numpy.typing import NDArray
 
 from wbplan.backends.cascade import Cascade
-from wbplan.backends.exact import ExactSolver
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
 from wbplan.joint_box import UNBOUNDED
@@ -39,7 +37,7 @@ class ProxqpBackend:
 
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
-        self._guess, self._exact = ActiveSetGuess(stack), ExactSolver(stack)
+        self._guess = ActiveSetGuess(stack)
         self._cascade = Cascade(stack) if len(stack.levels) > 1 else None
         self._qp = self._new_solver()
         self._started, self._scale = False, 1.0
@@ -76,17 +74,6 @@ class ProxqpBackend:
         return Solution(step, multipliers, levels)
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
-        return self._ask_exact() or self._ask_proxqp()
-
-    def _ask_exact(self) -> tuple[Array, Multipliers] | None:
-        """With ever less care for stopping. What it finds counts once its active bounds are proved right."""
-        while (found := self._exact.solve()) is None:
-            if not self._stack.ease():
-                return None
-        self._guess.learn(found[1])
-        return self._guess.solve()
-
-    def _ask_proxqp(self) -> tuple[Array, Multipliers]:
         s = self._stack
         if not (self._run() or self._retry() or self._eased() or (s.relax() and self._retry())):
             raise solve_error(s, "the QP has no solution")
