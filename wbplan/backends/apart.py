@@ -39,7 +39,7 @@ def keep_apart(stack: Stack, step: Array) -> Array:
         qp = proxsuite.proxqp.dense.QP(len(stack.g), len(stack.b), len(stack.d), True)
         qp.settings.eps_abs = 1e-9
         qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = 1e-14
-        qp.settings.max_iter = 2000
+        qp.settings.max_iter, qp.settings.max_iter_in = 200, 50
         qp.init(
             stack.H, -stack.H @ wanted, stack.A, stack.b, stack.C, np.full(len(stack.d), -UNBOUNDED), stack.d,
             stack.lower, stack.upper,

@@ -82,7 +82,7 @@ class ProxqpBackend:
         return self._ask_exact() or self._ask_proxqp()
 
     def _ask_exact(self) -> tuple[Array, Multipliers] | None:
-        """With ever less care for stopping; at last feet and loops may drift by what a later tick puts back."""
+        """With ever less care for stopping; at last feet may drift by what a later tick puts back."""
         while (found := self._exact.solve()) is None:
             if not self._stack.ease():
                 return self._exact.solve(SLIGHT)
