@@ -47,6 +47,7 @@ LAYERS = [
     "why",
     "retract",
     "backends",
+    "replay",
     "tick",
     "fallback",
     "bundle",
