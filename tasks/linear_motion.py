@@ -61,7 +61,12 @@ def script(
         contacts=[wb.Contact(foot, friction=friction) for foot in robot.feet.values()],
         hard=[wb.PoseTask("arm_tip", wb.MinJerk(tip, goal, seconds))],
         soft=soft,
-        limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+        limits=[
+            wb.JointLimits(),
+            wb.SupportPolygon(margin=margin),
+            wb.SelfCollision(),
+            wb.Obstacles([wb.Obstacle("ground", wb.Ground())]),
+        ],
         duration=seconds + hold,
     )
     return wb.Script(move, start=start)

@@ -57,7 +57,13 @@ def script(
     normals = dict.fromkeys(REAR, (-np.sin(tilt), 0.0, np.cos(tilt))) | dict.fromkeys(FRONT, (0.0, 0.0, 1.0))
     world = _world(feet, tilt, step, wall, friction)
     obstacles = wb.Obstacles(world, except_for=[("arm_link6", "wall")])
-    limits = [wb.JointLimits(speed=0.6), wb.SupportPolygon(margin=margin), wb.Forces(), obstacles]
+    limits = [
+        wb.JointLimits(speed=0.6),
+        wb.SupportPolygon(margin=margin),
+        wb.Forces(),
+        obstacles,
+        wb.SelfCollision(),
+    ]
     contacts = [wb.Contact(foot, friction=friction, normal=normals[foot]) for foot in feet]
     body = start.pose("body")
     touch = pin.SE3(np.eye(3), np.array([wall, 0.0, height]))

@@ -49,7 +49,12 @@ def script(
             wb.ManipulabilityTask("arm_tip", kind=kind, rate=rate, legs=legs),
             wb.PostureTask(weight=of_legs, gain=20.0),
         ],
-        limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin)],
+        limits=[
+            wb.JointLimits(),
+            wb.SupportPolygon(margin=margin),
+            wb.SelfCollision(),
+            wb.Obstacles([wb.Obstacle("ground", wb.Ground())]),
+        ],
         duration=seconds,
     )
     return wb.Script(raise_w, start=start)

@@ -65,7 +65,7 @@ def script(
         margin=margin,
         friction=friction,
         follow=0.0,
-        limits=(obstacles,),
+        limits=(obstacles, wb.SelfCollision()),
     )
     return wb.gaits.walk(
         walker,

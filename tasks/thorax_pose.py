@@ -32,6 +32,7 @@ def script(
     tilt: float = 4.0,
     seconds: float = 0.25,
     lift: float = 0.02,
+    acceleration: float = 80.0,
     margin: float = 0.02,
     friction: float = 0.7,
 ) -> wb.Script:
@@ -43,6 +44,7 @@ def script(
         tilt: about its x axis [degrees].
         seconds: of the motion, as in the paper's figures.
         lift: how high the free feet are lifted [m].
+        acceleration: of the joints at most [rad/s^2]; the paper's quarter of a second takes 64.
         margin: stability margin kept [m].
         friction: of the cups on the ground [-].
     """
@@ -70,7 +72,7 @@ def script(
             contacts=[wb.Contact(foot, friction=friction) for foot in feet],
             hard=[wb.PoseTask("thorax", thorax), *moves],
             limits=[
-                wb.JointLimits(),
+                wb.JointLimits(acceleration=acceleration),
                 wb.SupportPolygon(margin=margin),
                 wb.SelfCollision(CLEARANCE),
                 wb.Obstacles([floor], CLEARANCE),

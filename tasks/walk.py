@@ -72,5 +72,14 @@ def script(
     else:
         bend = wb.gaits.straight if path == "straight" else wb.gaits.arc
         track = bend(length, turn=math.radians(turn), heading=course)
-    manner = wb.gaits.Manner(step_time=step_time, height=rise, margin=margin, friction=friction)
+    # Of other robots it is not known here where their soles are and which of their links lie close by design.
+    ground = wb.Obstacle("ground", wb.Ground(), friction=friction)
+    apart = (wb.SelfCollision(), wb.Obstacles([ground])) if robot.name == ROBOT else ()
+    manner = wb.gaits.Manner(
+        step_time=step_time,
+        height=rise,
+        margin=margin,
+        friction=friction,
+        limits=apart,
+    )
     return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner).script

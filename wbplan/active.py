@@ -24,7 +24,7 @@ class Active:
 
     Attributes:
         name: e.g. 'leg3_joint2 upper', 'support polygon edge leg3_foot-leg4_foot', 'contact(leg4_foot)'.
-        kind: 'position', 'speed', 'hard', or that of its `RowBlock`, as 'margin'.
+        kind: 'position', 'speed', 'acceleration', 'jerk', 'hard', or that of its `RowBlock`, as 'margin'.
         multiplier: Lagrange multiplier, as a share of the soft tasks' pull; nan where the solver has none.
     """
 
@@ -45,10 +45,21 @@ class HeldBack:
         solution: the step, just taken.
     """
 
-    __slots__ = ("_distances", "_lower", "_multipliers", "_pull", "_row_names", "_stack", "_step", "_upper")
+    __slots__ = (
+        "_distances",
+        "_history",
+        "_lower",
+        "_multipliers",
+        "_pull",
+        "_row_names",
+        "_stack",
+        "_step",
+        "_upper",
+    )
 
     def __init__(self, stack: Stack, solution: Solution) -> None:
         self._stack, self._step = stack, solution.step
+        self._history = stack.box.history()
         self._lower, self._upper = stack.lower.copy(), stack.upper.copy()
         self._multipliers: tuple[Multipliers, ...] = ()
         if solution.levels:
@@ -88,9 +99,8 @@ class HeldBack:
 
     def _bound(self, column: int, up: bool, multiplier: float) -> Active:
         lower, upper = self._stack.box_names()[column]
-        reach = self._stack.reach(column)
-        bound = self._upper[column] if up else -self._lower[column]
-        kind = "speed" if bound >= reach * (1 - 1e-9) else "position"
+        bound = self._upper[column] if up else self._lower[column]
+        kind = self._stack.box.kind(column, float(bound), self._history)
         return Active(upper if up else lower, kind, float(multiplier))
 
     def _touched(self) -> list[Active]:

@@ -231,9 +231,12 @@ def view(
     port: Annotated[
         int | None, typer.Option(min=1, max=65535, help="Port to listen on; a free one where not given.")
     ] = None,
+    collisions: Annotated[
+        bool, typer.Option("--collisions", help="Also draw the collision shapes and the nearest pair.")
+    ] = False,
 ) -> None:
     """Serve a bundle in Meshcat until Ctrl-C."""
-    play(Bundle.read(folder), host, port)
+    play(Bundle.read(folder), host, port, collisions=collisions)
 
 
 @app.command()

@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.acceleration import acceleration_bounds, braking_bounds, jerk_bounds
 from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.errors import SpecError
@@ -98,6 +99,7 @@ class CompiledPhase:
             in one plane and nothing pushes.
         ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
+        acceleration, braking, jerk: (n,) bounds of all joints, see `wbplan.acceleration`; no jerk is None.
         standing: bodies that stand in the world and are not carried, each with its pose.
     """
 
@@ -116,6 +118,9 @@ class CompiledPhase:
     contact_points: Array
     held: tuple[Held, ...]
     roles: Mapping[str, str | None]
+    acceleration: Array
+    braking: Array
+    jerk: Array | None
     ascents: tuple[AscentTarget, ...] = ()
     standing: tuple[tuple[Body, Any], ...] = ()
 
@@ -158,6 +163,7 @@ def compile_phase(
     _check_feet(robot, phase, {**now, **phase.roles}, driven)
     level = {id(t): k for k, tasks in enumerate(phase.levels) for t in tasks}
     frames = _frame_targets(phase, model, state, level)
+    acceleration = acceleration_bounds(robot, phase, q, model)
     points = np.array([state.pose(c.frame).translation for c in phase.contacts]).reshape(-1, 3)
     balance = [t for t in phase.soft_tasks if isinstance(t, BalanceTask)]
     polygon, region = support(phase, model, state, points, wanted=bool(balance))
@@ -197,6 +203,7 @@ def compile_phase(
         points,
         held,
         {**now, **phase.roles},
+        *(acceleration, braking_bounds(robot, phase, acceleration), jerk_bounds(robot, phase)),
         tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
         standing(phase.carried, placed or {}, bodies),
     )

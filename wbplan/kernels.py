@@ -265,34 +265,53 @@ def cost(
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def box(q: Any, q_index: Any, q_lower: Any, q_upper: Any, reach: Any, lower: Any, upper: Any) -> None:
-    """The joints' box: position bounds clipped to what the speed bound lets one tick reach."""
-    for i in range(q_index.shape[0]):
-        here = q[q_index[i]]
-        lower[6 + i] = max(min(q_lower[i] - here, reach[i]), -reach[i])
-        upper[6 + i] = max(min(q_upper[i] - here, reach[i]), -reach[i])
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
 def polygon(
     normals: Any,
-    offsets: Any,
-    com: Any,
     com_jacobian: Any,
     free: Any,
     driven: Any,
     driven_step: Any,
-    margin: float,
-    least: float,
+    most: Any,
     C: Any,
     d: Any,
 ) -> None:
-    """C and d of N (c + J x) <= offsets - margin, where d is never below `least` [m]."""
-    for e in range(offsets.shape[0]):
+    """C and d of N J x <= most (E,) [m]: by how much this tick may bring the CoM nearer to each edge."""
+    for e in range(most.shape[0]):
         x, y = normals[e, 0], normals[e, 1]
         for c in range(free.shape[0]):
             C[e, c] = x * com_jacobian[0, free[c]] + y * com_jacobian[1, free[c]]
-        d[e] = max(offsets[e] - x * com[0] - y * com[1] - margin, least)
+        d[e] = most[e]
         for c in range(driven.shape[0]):
             column = driven[c]
             d[e] -= (x * com_jacobian[0, column] + y * com_jacobian[1, column]) * driven_step[c]
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def approach(
+    distances: Any,
+    closing: Any,
+    ticks: float,
+    factor: float,
+    back: float,
+    ramp: float,
+    ease: int,
+    most: Any,
+) -> None:
+    """By how much this tick may bring the CoM nearer to each edge, most (E,) [m].
+
+    Inside, so that it stops before the edge when all joints slow down (see `joint_box`), but never less than
+    that slowing leads on by itself. Outside, inward: up to `back`, and by no more than `ramp` faster than
+    before.
+
+    Shapes:
+        distances: (E,) of the CoM to the edges [m]; closing: (E,) by how much the last tick shortened them.
+        ticks, factor: of `joint_box.stopping`; back, ramp: [m]; ease: of `joint_box.box`.
+    """
+    for e in range(distances.shape[0]):
+        slower = closing[e] * factor if closing[e] > 0.0 else closing[e]
+        if distances[e] >= 0.0:
+            most[e] = distances[e]
+            if ease == 0:
+                most[e] = min(distances[e], max(2.0 * distances[e] / (ticks + 1.0), slower))
+        else:
+            most[e] = max(-back, distances[e], slower - ramp)

@@ -104,6 +104,15 @@ def number(
     return found
 
 
+def vector(value: object, size: int, what: str) -> Array:
+    """A copy of `size` finite numbers; refused with a `SpecError` if it is not that."""
+    found = numeric(value)
+    if found is None or found.shape != (size,) or not np.isfinite(found).all():
+        got = value if found is None else f"shape {found.shape}" if found.shape != (size,) else found
+        raise SpecError(f"{what}: expected {size} finite numbers, got {got!s:.80}")
+    return np.array(found, dtype=np.float64)
+
+
 def name_of(value: object, what: str) -> str:
     """A name, refused with a `SpecError` where it is empty or no text."""
     if not isinstance(value, str) or not value:

@@ -6,7 +6,7 @@ import contextlib
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.acceleration import acceleration_bounds, braking_bounds
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
 from wbplan.compiled import CompiledPhase
@@ -93,7 +94,7 @@ class Plan:
         Raises:
             BundleError: the folder cannot be written.
         """
-        from wbplan import plots
+        from wbplan import forceplots, plots
         from wbplan.view import write_html
 
         return self.bundle.write(
@@ -101,6 +102,7 @@ class Plan:
             extras={
                 "scene.html": lambda path: write_html(self.bundle, path, package_dirs=self._folders),
                 "plots.png": lambda path: plots.save(self.bundle, path),
+                "forces.png": lambda path: forceplots.save(self.bundle, path),
             },
         )
 
@@ -168,7 +170,7 @@ def plan(
     state = start if isinstance(start, State) else robot.state(start)
     if list(state.model.names) != list(robot.model.names):  # its q may be of the same size
         raise SpecError(f"start: a state of '{state.model.name}', expected one of '{robot.name}'")
-    q, roles = np.array(state.q), None
+    q, roles, velocity = np.array(state.q), None, np.zeros(robot.model.nv)
     _inside_limits(robot, q)
     placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
@@ -190,7 +192,11 @@ def plan(
         if phase.joint_limits is None:
             raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
-        loop = Loop(robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies)
+        loop = Loop(
+            robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies,
+            velocity=velocity, rest_at=(sum(lengths) - done) * dt,
+            braking=_least_braking(robot, script.phases[index:], q),
+        )  # fmt: skip
         _promises_hold(loop, phase)
         recorder.begin(index, loop, placed, done * dt)
         loops.append((done * dt, loop))
@@ -209,7 +215,7 @@ def plan(
                 raise SolveError(said, error.clashes, error.limits, kept) from None
             recorder.record(loop, tick)
         done += ticks
-        q, roles = loop.q, loop.compiled.roles
+        q, roles, velocity = loop.q, loop.compiled.roles, loop.velocity
         placed.update(_where_held(loop.compiled, q))
         recorder.end(index, loop, done * dt)
     if observe is not None:
@@ -248,6 +254,13 @@ def _interrupts_held() -> Iterator[None]:
             signal.signal(signum, handler)
     if came:
         signal.raise_signal(came[0][0])
+
+
+def _least_braking(robot: Robot, phases: Sequence[Phase], q: Array) -> Array:
+    """(n,) what each joint can count on for braking in all of these phases [rad/s^2, m/s^2]."""
+    found = [braking_bounds(robot, phase, acceleration_bounds(robot, phase, q)) for phase in phases]
+    least: Array = np.min(found, axis=0)
+    return least
 
 
 def _inside_limits(robot: Robot, q: Array) -> None:

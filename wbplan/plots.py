@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pinocchio as pin
@@ -42,7 +42,7 @@ def save(bundle: Bundle, path: str | Path) -> Path:
     """
     path = Path(path)
     try:
-        path.write_bytes(_png(figure(bundle)))
+        path.write_bytes(png(figure(bundle)))
     except OSError as error:
         raise BundleError(f"{path}: cannot be written: {error.strerror or error}") from error
     return path
@@ -60,7 +60,7 @@ def figure(bundle: Bundle) -> Figure:
         """A figure that needs no pyplot to be shown."""
 
         def _repr_png_(self) -> bytes:
-            return _png(self)
+            return png(self)
 
     drawing = Plan(figsize=SIZE, dpi=DPI, layout="constrained", facecolor="white")
     engine: Any = drawing.get_layout_engine()
@@ -81,11 +81,11 @@ def figure(bundle: Bundle) -> Figure:
     return drawing
 
 
-def _png(drawing: Figure) -> bytes:
+def png(drawing: Figure) -> bytes:
+    """A figure as the bytes of a PNG file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    file = io.BytesIO()
-    canvas: Any = FigureCanvasAgg(drawing)
+    file, canvas = io.BytesIO(), cast(Any, FigureCanvasAgg(drawing))
     with warnings.catch_warnings():  # labels of absurd numbers leave no room
         warnings.simplefilter("ignore", UserWarning)
         canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time

@@ -142,6 +142,7 @@ class Recorder:
                     }
                     for h in loop.compiled.held
                 ],
+                "joint_acceleration": [float(a) for a in loop.compiled.acceleration],
                 **_region(loop.compiled),
                 **_kept_apart(phase),
                 "obstacles": [item.name for item in phase.obstacles.shapes] if phase.obstacles else [],
@@ -207,6 +208,7 @@ class Recorder:
             "dt": self._dt,
             "parameters": parameters,
             "bodies": [{"name": b.name, "size": list(b.size), "mass": b.mass} for b in self._script.bodies],
+            "joint_acceleration": np.max([p["joint_acceleration"] for p in self._phases], axis=0).tolist(),
             "obstacles": [to_record(item) for item in self._script.obstacles],
             "ignored_pairs": sorted(sorted(pair) for pair in self._robot.ignored_collisions),
             "feet": list(self._robot.feet.values()),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wbplan.backends import Backend, make_backend
 from wbplan.compiled import CompiledPhase
+from wbplan.joint_box import Pace
 from wbplan.qp import Solution
 from wbplan.stack import Stack
 from wbplan.why import Why, active_sets, explain, put_goals
@@ -30,8 +31,8 @@ class Replay:
         self._made: tuple[Stack, Backend | None] | None = None
 
     def why(
-        self, backend: str, q: Array, t: float, goals: tuple[Array, ...], solution: Solution, task: str,
-        part: str | None,
+        self, backend: str, q: Array, t: float, goals: tuple[Array, ...], pace: Pace, solution: Solution,
+        task: str, part: str | None,
     ) -> Why:  # fmt: skip
         """What held a task back in a tick.
 
@@ -40,6 +41,7 @@ class Replay:
             q: (nq,) configuration before the tick.
             t: time [s] of the phase then.
             goals: of `keep_goals`.
+            pace: of `JointBox.keep_pace`.
             solution: of the tick.
             task: of `Tick.why`.
             part: of `Tick.why`.
@@ -51,6 +53,7 @@ class Replay:
         stack.aim(t)
         put_goals(stack, goals)
         stack.measure(q)
+        stack.box.put_pace(pace)
         stack.advance(t)
         put_goals(stack, goals)
         if solver is None:

@@ -10,7 +10,8 @@ import pinocchio as pin
 import proxsuite
 from numpy.typing import NDArray
 
-from wbplan.stack import UNBOUNDED, Stack
+from wbplan.joint_box import UNBOUNDED
+from wbplan.stack import Stack
 
 Array = NDArray[np.float64]
 

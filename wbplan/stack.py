@@ -3,7 +3,7 @@
     minimise    1/2 |weight (J dq - rhs)|^2 over soft rows  +  1/2 dq' D dq  -  h' dq
     subject to  A dq = b              contacts, hard tasks
                 C dq <= d             support polygon
-                lower <= dq <= upper  joint positions and speeds
+                lower <= dq <= upper  joint positions, speeds and accelerations (see `joint_box`)
 
 D and h hold what is diagonal: posture, damping, and a curvature damping. A Gauss-Newton step neglects the
 curvature of a task's error; near a stretched limb the true Hessian then exceeds J'J by up to
@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 from wbplan import kernels
 from wbplan.ascent import Ascent
 from wbplan.blocks import RowBlock, edge_names, name_rows
-from wbplan.collision import CAPACITY, Clearance, collision_model
+from wbplan.collision import CAPACITY, SHARE, Clearance, collision_model
 from wbplan.compiled import CompiledPhase
+from wbplan.joint_box import RECOVERY, UNBOUNDED, JointBox
 from wbplan.kinematics import Kinematics
 from wbplan.levels import Level
 from wbplan.paths import number
@@ -37,11 +38,11 @@ Array = NDArray[np.float64]
 #: Always on the diagonal [1/rad^2]: keeps the cost strictly convex where nothing is asked.
 REGULARISATION = 1e-6
 
+#: Drift of a hard row [m or rad] that may wait for a tick.
+SLIGHT = 2e-5
+
 #: The tick stays this far [m] inside the promised margin: its row is linear, the CoM's path is not.
 MARGIN_RESERVE = 1e-4
-
-#: Stands for no bound in the QP.
-UNBOUNDED = 1e20
 
 
 @final
@@ -60,8 +61,11 @@ class Stack:
         clearance: distances between links, bodies and obstacles; None where the phase promises none.
         levels: the soft tasks by priority; H and g are those of the first.
         normals: (E, 2) of the support polygon's edges.
+        box: the joints' box, whose arrays lower and upper are.
         driven: columns of the joints whose motion is given; driven_step: how far each goes in this tick;
             driving: whether any of them moves.
+        easing: how much less careful this tick is than it should be, see `ease`.
+        closer: (E,) [m] by how much nearer the CoM may come to each edge.
         ascents: manipulability tasks.
         postures: soft posture tasks; hard_joints: (joint, path, label) of hard ones, hard_joint_goal: where.
     """
@@ -75,12 +79,14 @@ class Stack:
         self.driven_step = np.zeros(len(self.driven))
         self._moving_driven = [(k, d) for k, d in enumerate(phase.driven) if not d.path.constant]
         self.driving = bool(self._moving_driven)
-        self.drift, self.margin = 0.0, np.inf
+        self.drift, self.margin, self.easing = 0.0, np.inf, 0
         self._hard_rows()
         self._soft_rows()
-        self._joint_box()
+        self.box = JointBox(phase, dt)
+        self.lower, self.upper, self.q_index = self.box.lower, self.box.upper, self.box.q_index
         self._polygon()
         self._clearance()
+        self._gaps, self._closing = np.full(len(self.d), UNBOUNDED), np.zeros(len(self.d))
         self.ascents = tuple(Ascent(target, phase, dt, self.kinematics.data) for target in phase.ascents)
 
     def _hard_rows(self) -> None:
@@ -105,11 +111,8 @@ class Stack:
         rows, nf = self.rows, len(self.free)
         soft = slice(rows.hard, len(rows.error))
         count = len(rows.error) - rows.hard
-        self._weight, self._soft_error, self._soft_motion = (
-            rows.weight[soft],
-            rows.error[soft],
-            rows.motion[soft],
-        )
+        self._weight, self._soft_error = rows.weight[soft], rows.error[soft]
+        self._soft_motion = rows.motion[soft]
         self._pull = 1.0 - np.exp(-rows.gain[soft] * self.dt)
         self._curvature = 0.5 * self.levers(soft) * self._weight**2 * self._pull
         self._soft, self._soft_given, self._soft_rhs = np.zeros((count, nf)), np.zeros(count), np.zeros(count)
@@ -154,20 +157,6 @@ class Stack:
         """Bound on each row's curvature, per unit of its error: lever arm [m], or 1 for a rotation."""
         return levers(self.phase, self.rows, rows)
 
-    def _joint_box(self) -> None:
-        """Bounds of the free joints; the base (first six columns) has none."""
-        model, limits, nf = self.phase.model, self.phase.phase.joint_limits, len(self.free)
-        self.q_index = self.free[6:] + 1
-        self._q_lower, self._q_upper = np.full(nf - 6, -np.inf), np.full(nf - 6, np.inf)
-        self._reach = np.full(nf - 6, np.inf)
-        self.lower, self.upper = np.full(nf, -UNBOUNDED), np.full(nf, UNBOUNDED)
-        if limits is not None:
-            self._q_lower = np.array(model.lowerPositionLimit)[self.q_index]
-            self._q_upper = np.array(model.upperPositionLimit)[self.q_index]
-            self._reach = limits.speed * np.array(model.velocityLimit)[self.free[6:]] * self.dt
-        else:
-            self._reach[:], self._q_lower[:], self._q_upper[:] = UNBOUNDED, -UNBOUNDED, UNBOUNDED
-
     def _polygon(self) -> None:
         polygon = self.phase.polygon
         self.normals = np.zeros((0, 2)) if polygon is None else np.ascontiguousarray(polygon.normals)
@@ -177,6 +166,7 @@ class Stack:
         self.blocks: list[RowBlock] = []
         if edges:
             self.blocks.append(RowBlock("margin", "m", slice(0, edges), lambda: self.edge_names))
+        self.closer = np.zeros(edges)
         self._edges = (self.C, self.d)
 
     def _clearance(self) -> None:
@@ -207,7 +197,8 @@ class Stack:
             posture.aim(t)
 
     def advance(self, t: float) -> None:
-        """Move all targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
+        """Move targets and driven joints on from time `t` [s] by a tick, keeping how far each goes."""
+        self.easing = 0
         self.rows.advance(t, self.dt)
         t += self.dt
         for posture in self.postures:
@@ -250,19 +241,27 @@ class Stack:
         for ascent in self.ascents:
             ascent.update()
             ascent.write(self.levels[-1].H, self.levels[-1].g)
-        self.fill_box()
-        support = self.phase.phase.support
-        if support is not None:
-            self._fill_polygon(support.margin, -support.recovery_speed * self.dt)
+        near = slice(len(self.closer), None)
         if self.clearance is not None:
-            self.clearance.write(kin.jacobian, *self._near)
+            self.clearance.write(kin.jacobian, *self._near, share=1.0)
+            self._gaps[near], self._closing[near] = self.d[near], self.C[near] @ self.box.last
+        self.fill_box()
+        self._limit()
 
-    def _fill_polygon(self, margin: float, least: float) -> None:
-        kin = self.kinematics
-        kernels.polygon(
-            self.normals, self._offsets, kin.com, kin.com_jacobian, self.free, self.driven, self.driven_step,
-            margin + MARGIN_RESERVE, least, *self._edges,
-        )  # fmt: skip
+    def _limit(self) -> None:
+        """Fill d: how much nearer things may come."""
+        self._fill_polygon(self.closer)
+        near = slice(len(self.closer), None)
+        self.d[near] = self._gaps[near]
+        if self.easing == 0:
+            self.d[near] = self.box.slowed(self._gaps[near], self._closing[near], SHARE)
+
+    def _fill_polygon(self, most: Array) -> None:
+        if self.phase.phase.support is not None:
+            kernels.polygon(
+                self.normals, self.kinematics.com_jacobian, self.free, self.driven, self.driven_step, most,
+                *self._edges,
+            )  # fmt: skip
 
     def distances(self) -> Array:
         """(E,) of the CoM at the last `measure` to each edge of the support polygon [m]."""
@@ -270,13 +269,40 @@ class Stack:
         return gaps
 
     def fill_box(self) -> None:
-        """Fill lower and upper for the current configuration."""
-        kernels.box(
-            self.kinematics.q, self.q_index, self._q_lower, self._q_upper, self._reach, self.lower, self.upper
-        )
+        """Fill lower, upper and closer for this configuration."""
+        support, box, edges = self.phase.phase.support, self.box, len(self.closer)
+        if support is None:
+            box.fill(self.kinematics.q, self._gaps, self._closing, self.easing)
+            return
+        inside, closing = self._gaps[:edges], self._closing[:edges]
+        inside[:] = self.distances() - (support.margin + MARGIN_RESERVE)
+        closing[:] = self.normals @ self.box.com_step[:2]
+        box.fill(self.kinematics.q, self._gaps, self._closing, self.easing)
+        back, ramp = support.recovery_speed * self.dt, support.recovery_speed * self.dt**2 / RECOVERY
+        kernels.approach(inside, closing, box.ticks, box.factor, back, ramp, self.easing, self.closer)
+
+    def ease(self) -> bool:
+        """Be less careful in this tick, which found no step; False if that has been tried.
+
+        All joints are to be able to stop together (0), or each by itself (1), or with nearly all of its
+        acceleration (2): where hard tasks lead on, they cannot together. Drift waits (3).
+        """
+        if self.easing >= 2 + (self.drift <= SLIGHT) or self.phase.phase.joint_limits is None:
+            return False
+        self.easing += 1
+        self.fill_box()
+        self._limit()
+        self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard] * (self.easing == 3)
+        return True
+
+    def begin(self, step: Array) -> None:
+        """Start after a step (nv,) [m, rad], and the same before it."""
+        self.kinematics.differentiate()
+        self.box.took(step[self.free], self.kinematics.com_jacobian @ step)
+        self.box.older[:] = self.box.previous
 
     def soft_damping(self) -> float:
-        """The damping on H's diagonal for the errors of the last `measure`, without assembling H."""
+        """The damping on H's diagonal for the errors of the last `measure`."""
         return REGULARISATION + self.phase.damping + float(np.abs(self._soft_error) @ self._curvature)
 
     def relax(self) -> bool:
@@ -290,8 +316,7 @@ class Stack:
     def linearise(self, *, recovering: bool) -> None:
         """Fill A, b, C and d for a correction at the configuration that `measure` saw last: no target moves.
 
-        Args:
-            recovering: the CoM comes from outside the margin, so the correction need not bring it inside.
+        A CoM that is `recovering`, from outside its margin, need not be brought inside.
         """
         rows, kin = self.rows, self.kinematics
         given = self.driven_step.copy()
@@ -302,34 +327,11 @@ class Stack:
         self.b[:] = self.hard_error
         support = self.phase.phase.support
         if support is not None:
-            self._fill_polygon(support.margin, 0.0 if recovering else -np.inf)
+            inside = self.distances() - (support.margin + MARGIN_RESERVE)
+            self._fill_polygon(np.maximum(inside, 0.0) if recovering else inside)
         if self.clearance is not None:
             self.clearance.linearise(kin.jacobian, *self._near)
         self.driven_step[:] = given
-
-    def reach(self, column: int) -> float:
-        """How far [m or rad] the speed limit lets a free column move in one tick."""
-        return float(self._reach[column - 6])
-
-    def box_kind(self, column: int, *, up: bool) -> str:
-        """What makes a free column's bound: 'position' or 'speed'."""
-        bound = self.upper[column] if up else -self.lower[column]
-        return "speed" if bound >= self._reach[column - 6] * (1.0 - 1e-9) else "position"
-
-    def relaxed_box(self, column: int, kind: str, by: float, *, up: bool) -> tuple[Array, Array]:
-        """Lower and upper as they would be were a limit of one joint wider by so much [rad, m, or per s]."""
-        kept, j = (self._q_lower.copy(), self._q_upper.copy(), self._reach.copy()), column - 6
-        if kind == "speed":
-            self._reach[j] += by * self.dt
-        elif up:
-            self._q_upper[j] += by
-        else:
-            self._q_lower[j] -= by
-        self.fill_box()
-        moved = self.lower.copy(), self.upper.copy()
-        self._q_lower, self._q_upper, self._reach = kept
-        self.fill_box()
-        return moved
 
     # -- names -------------------------------------------------------------------------------------------
 

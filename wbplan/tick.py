@@ -25,7 +25,7 @@ from wbplan.bodies import Body
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
-from wbplan.paths import number
+from wbplan.paths import number, vector
 from wbplan.qp import Solution
 from wbplan.replay import Replay
 from wbplan.retract import DRIFT, Retraction
@@ -136,12 +136,16 @@ class Loop:
         placed: pose in the world of bodies that stand somewhere, by name.
         roles: the role that each limb is in, where `q` leaves it open.
         bodies: the bodies that there are; those in `placed` that are not carried stand in the way.
+        velocity: (nv,) at which it starts, as `Loop.velocity` of a loop before [m/s, rad/s]; at rest.
+        rest_at: time [s] of the phase by which all joints are to be at rest; by default never.
+        braking: (n,) accelerations [rad/s^2, m/s^2] that phases after this one leave for braking.
 
     Attributes:
+        velocity: (nv,) of the last step [m/s, rad/s].
         last: the last tick made; None before the first.
 
     Raises:
-        SpecError: the phase does not fit the robot.
+        SpecError: the phase does not fit the robot, or not how it moves when the phase begins.
     """
 
     def __init__(
@@ -155,6 +159,9 @@ class Loop:
         placed: Mapping[str, Any] | None = None,
         roles: Mapping[str, str | None] | None = None,
         bodies: Sequence[Body] = (),
+        velocity: Array | None = None,
+        rest_at: float | None = None,
+        braking: Array | None = None,
     ) -> None:
         self.dt, self.t = number(dt, "dt", "a finite positive time in seconds", above=0.0), 0.0
         if isinstance(state, State) and list(state.model.names) != list(robot.model.names):
@@ -169,6 +176,17 @@ class Loop:
         self._retraction = Retraction(self.stack)
         self.last: Tick | None = None
         self._replay = Replay(self.compiled, self.dt)
+        self._begin(velocity, rest_at, braking)
+
+    def _begin(self, velocity: Array | None, rest_at: float | None, braking: Array | None) -> None:
+        """How it moves when the phase begins, and when it is to be at rest."""
+        nv = self.compiled.model.nv
+        self.velocity = vector(np.zeros(nv) if velocity is None else velocity, nv, "Loop: velocity")
+        self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
+        joints = self.compiled.free[6:]
+        self.stack.begin(self.velocity * self.dt)
+        if braking is not None:
+            self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
 
     @property
     def backend(self) -> str:
@@ -235,10 +253,12 @@ class Loop:
         elif stack.live:
             stack.aim(self.t)
             stack.measure(q)
-        before = stack.margin
+        before, com = stack.margin, stack.kinematics.com.copy()
         if stack.clearance is not None:
             stack.clearance.start()
         ends = self.t + self.dt
+        if self._rest_at is not None:
+            stack.box.left = max(1.0, round((self._rest_at - self.t) / self.dt))
         try:
             stack.advance(self.t)
             solution = self._solve()
@@ -248,9 +268,13 @@ class Loop:
             stack.measure(q)
             raise
         self.q, self.t = new, ends
-        v = pin.difference(self.compiled.model, q, new) / self.dt
-        replay = partial(self._replay.why, self.backend, q, began, keep_goals(stack), solution)
-        self.last = Tick(self, v, HeldBack(stack, solution), replay, started)
+        taken = pin.difference(self.compiled.model, q, new)
+        pace = stack.box.keep_pace()
+        replay = partial(self._replay.why, self.backend, q, began, keep_goals(stack), pace, solution)
+        held_back = HeldBack(stack, solution)
+        self.velocity = taken / self.dt
+        stack.box.took(taken[stack.free], stack.kinematics.com - com)
+        self.last = Tick(self, self.velocity, held_back, replay, started)
         return self.last
 
     def _solve(self) -> Solution:

@@ -207,7 +207,9 @@ def _reasons(stack: Stack, held: tuple[Held, ...], found: Slopes, label: str) ->
     for k, (name, kind, unit) in enumerate(stack.row_names()):
         if name and found.rows[k]:
             one = "mm" if unit == "m" else "deg"
-            yield Reason(name, kind, one, -found.rows[k] * UNITS[one])
+            # The CoM slows down before an edge: a tick may take only this share of what is left.
+            share = 2.0 / (stack.box.ticks + 1.0) if kind == "margin" and stack.easing == 0 else 1.0
+            yield Reason(name, kind, one, -share * found.rows[k] * UNITS[one])
     groups: dict[tuple[str, str, str], list[float]] = {}
     for (name, unit), slope in zip(stack.hard_names(), found.hard, strict=True):
         kind = "contact" if name.startswith("contact(") else "hard"
@@ -232,11 +234,16 @@ def _bounds(stack: Stack, held: tuple[Held, ...], found: Slopes) -> Iterator[Rea
     joints = stack.phase.robot.joint_names
     for column in np.flatnonzero(found.box):
         up = bool(upper[column])
-        kind = stack.box_kind(int(column), up=up)
+        kind = stack.box.kind(
+            int(column), float((stack.upper if up else stack.lower)[column]), stack.box.history()
+        )
         base = "mm" if _slides(stack, int(column)) else "deg"
         one = base + RATES[kind]
         by = 1e-3 * UNITS[one]
-        low, high = stack.relaxed_box(int(column), kind, by, up=up)
+        with stack.box.relaxed(int(column), kind, by, up=up):
+            stack.fill_box()
+            low, high = stack.lower.copy(), stack.upper.copy()
+        stack.fill_box()
         moved = np.where(upper, high - stack.upper, low - stack.lower)
         gain = -float(found.box[6:] @ moved[6:]) * UNITS[one] / by
         name = names[column][int(up)] if kind == "position" else f"{joints[stack.free[column] - 6]} {kind}"

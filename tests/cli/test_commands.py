@@ -19,7 +19,15 @@ from wbplan.bundle import Bundle
 Refused = Callable[..., str]
 Call = Callable[..., Any]
 
-FILES = ["plan.json", "plots.png", "robot.urdf", "scene.html", "trajectory.csv", "trajectory.npz"]
+FILES = [
+    "forces.png",
+    "plan.json",
+    "plots.png",
+    "robot.urdf",
+    "scene.html",
+    "trajectory.csv",
+    "trajectory.npz",
+]
 
 
 @pytest.fixture(scope="module")

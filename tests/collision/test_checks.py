@@ -58,7 +58,7 @@ def moved(bundle: Bundle, **joints: float) -> Bundle:
 def test_kept_as_planned_and_from_the_files(plan: wb.Plan, tmp_path: Path) -> None:
     report = plan.check().require()
     assert report["clearance"].worst >= 0.005
-    assert report["depth of touch"].worst >= -0.002 - 1e-5
+    assert report["depth of touch"].worst >= -0.005 - 1e-5
     plan.bundle.write(tmp_path / "out")
     back = Bundle.read(tmp_path / "out")
     assert [item.name for item in back.obstacles] == ["ground", "ball"]
@@ -92,7 +92,7 @@ def test_tampered(plan: wb.Plan, case: str) -> None:
 
 
 def test_a_foot_that_goes_in_deeper_than_it_stood(plan: wb.Plan) -> None:
-    """The free foot pushed 4 mm into the ground in mid-phase."""
+    """The free foot pushed 7 mm into the ground in mid-phase."""
     q = plan.bundle.trajectory.q.copy()
     foot = ROBOT.feet["leg1"]
     joints = [ROBOT.joint_index(name) for name in ROBOT.limbs["leg1"]]
@@ -104,14 +104,14 @@ def test_a_foot_that_goes_in_deeper_than_it_stood(plan: wb.Plan) -> None:
             frame = ROBOT.frame_id(foot)
             J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3, [v for _, v in joints]]
             goal = data.oMf[frame].translation.copy()
-            goal[2] = -0.004
+            goal[2] = -0.007
             step = np.linalg.lstsq(J, goal - data.oMf[frame].translation, rcond=None)[0]
             for (i, _), value in zip(joints, step, strict=True):
                 q[k, i] += value
     report = check(Bundle(plan.bundle.plan, replace(plan.bundle.trajectory, q=q), plan.bundle.urdf))
     row = report["depth of touch"]
     assert not row.held
-    assert row.worst == pytest.approx(-0.004, abs=1e-4)
+    assert row.worst == pytest.approx(-0.007, abs=1e-4)
     assert row.where.endswith("ground")
 
 

@@ -67,7 +67,15 @@ def test_the_first_example_plans_checks_and_saves(tmp_path: Path) -> None:
     assert gap(pose_of(box_path[-1]), goal) < 2e-3
     folder = plan.save(tmp_path / "lift")
     names = {path.name for path in folder.iterdir()}
-    assert names == {"plan.json", "robot.urdf", "trajectory.npz", "trajectory.csv", "scene.html", "plots.png"}
+    assert names == {
+        "plan.json",
+        "robot.urdf",
+        "trajectory.npz",
+        "trajectory.csv",
+        "scene.html",
+        "plots.png",
+        "forces.png",
+    }
     assert wb.check(wb.Bundle.read(folder)).ok
 
 

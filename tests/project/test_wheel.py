@@ -76,6 +76,7 @@ def test_it_plans_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
     assert planned.returncode == 0, planned.stdout + planned.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
     assert sorted(p.name for p in (tmp_path / "out" / "clamp").iterdir()) == [
+        "forces.png",
         "plan.json",
         "plots.png",
         "robot.urdf",

@@ -50,8 +50,7 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
     out = Outcome()
     robot = any_robot(rng)
     state = start_of(rng, robot)
-    q, roles = np.array(state.q), None
-    moving: dict[str, Any] = {}
+    q, roles, velocity = np.array(state.q), None, None
     placed: dict[str, Any] = {}
     dt = rng.choice((0.001, 0.002, 0.005, 0.01, 0.02))
     for k in range(rng.randint(1, 4)):
@@ -60,7 +59,9 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
             made = scene(rng, robot, robot.state(q), f"phase{k}")
             if len(made.phase.levels) > 1:
                 backend = "proxqp"  # the one that has levels
-            loop = wb.Loop(robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles, **moving)
+            loop = wb.Loop(
+                robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles, velocity=velocity
+            )
         except wb.WbplanError as error:
             out.counts[f"phase refused: {kind_of(error)}"] += 1
             continue
@@ -68,14 +69,12 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
         held = {h.body.name: h.T_holder_body for h in loop.compiled.held}
         polygon = loop.compiled.polygon
         region = (polygon.normals, polygon.offsets) if polygon is not None and loop.compiled.region else None
-        bounds = getattr(loop.compiled, "acceleration", None)
-        watch = Watch(robot, made.phase, q, dt, held, region, bounds, moving.get("velocity"))
+        bounds = loop.compiled.acceleration
+        watch = Watch(robot, made.phase, q, dt, held, region, bounds, velocity)
         _run_phase(rng, loop, made, watch, out, backend, min(LONGEST, most - out.ticks))
         out.add({}, watch.worst, [])
         q, roles = np.array(loop.q), loop.compiled.roles
-        moving = {}
-        if hasattr(loop, "velocity") and rng.random() < 0.5:
-            moving = {"velocity": np.array(loop.velocity)}
+        velocity = np.array(loop.velocity) if rng.random() < 0.5 else None
         if out.found or out.ticks >= most:
             break
     return out

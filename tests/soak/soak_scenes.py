@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -95,13 +95,10 @@ def _joint_limits(rng: random.Random, robot: wb.Robot) -> wb.JointLimits:
     """Speeds, accelerations for all joints or for some, seldom a jerk."""
     named = rng.sample(robot.joint_names, min(3, len(robot.joint_names)))
     by_joint = {name: rng.choice((0.5, 20.0, 300.0)) for name in named}
-    changes = {
-        "acceleration": rng.choice((None, None, 1.0, 20.0, 1000.0, by_joint)),
-        "jerk": rng.choice((None,) * 9 + (500.0,)),
-    }
-    known = {field.name for field in fields(wb.JointLimits)}
     return wb.JointLimits(
-        speed=rng.choice((1.0, 1.0, 0.5, 0.05)), **{k: v for k, v in changes.items() if k in known}
+        speed=rng.choice((1.0, 1.0, 0.5, 0.05)),
+        acceleration=rng.choice((None, None, 1.0, 20.0, 1000.0, by_joint)),
+        jerk=rng.choice((None,) * 9 + (500.0,)),
     )
 
 

@@ -70,12 +70,11 @@ class Watch:
             return
         if bound is not None:
             self.change[:] = np.array(bound) * self.dt**2
-        named = getattr(limits, "acceleration", None)
-        if isinstance(named, Mapping):
-            for name, value in named.items():
+        if isinstance(limits.acceleration, Mapping):
+            for name, value in limits.acceleration.items():
                 self.change[robot.joint_index(name)[1] - 6] = value * self.dt**2
-        elif named is not None:
-            self.change[:] = named * self.dt**2
+        elif limits.acceleration is not None:
+            self.change[:] = limits.acceleration * self.dt**2
         for name in (*given, *phase.locked):
             self.change[robot.joint_index(name)[1] - 6] = np.inf
 

@@ -24,7 +24,7 @@ def run(loop: wb.Loop, ticks: int) -> list[wb.Tick]:
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_a_start_outside_a_joint_limit_comes_back_inside_at_the_speed_limit(
+def test_a_start_outside_a_joint_limit_comes_back_inside_within_its_speed_and_acceleration(
     legarm: wb.Robot, backend: str
 ) -> None:
     q = np.array(legarm.state("manipulate").q)
@@ -33,12 +33,16 @@ def test_a_start_outside_a_joint_limit_comes_back_inside_at_the_speed_limit(
     q[index] = upper + 0.2
     loop = wb.Loop(legarm, stand(FEET[:4], soft=[wb.PostureTask(weight=1.0)]), q, dt=0.01, backend=backend)
     speed = legarm.model.velocityLimit[legarm.joint_index("limb1_joint2")[1]]
+    most = loop.compiled.acceleration[index - 7]
     outside = [upper + 0.2]
-    for tick in run(loop, 10):
+    for tick in run(loop, 60):
         outside.append(tick.q[index])
         assert abs(outside[-1] - outside[-2]) <= speed * 0.01 + 1e-9
     assert outside[1] < outside[0]
     assert outside[-1] <= upper + 1e-9
+    steps = np.diff([upper + 0.2, *outside]) / 0.01
+    assert np.abs(np.diff(steps)).max() <= most * 0.01 + 1e-9
+    assert np.diff(outside).min() < -0.5 * min(speed * 0.01, np.sqrt(0.1 * most) * 0.01)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -108,7 +112,7 @@ def test_a_tick_names_the_limit_that_stops_it(legarm: wb.Robot) -> None:
     tick = run(loop, 400)[-1]
     names = [active.name for active in tick.active]
     assert any(name.startswith("leg") and name.endswith(("upper", "lower")) for name in names), names
-    assert {active.kind for active in tick.active} <= {"position", "speed", "hard", "margin"}
+    assert {active.kind for active in tick.active} <= {"position", "speed", "acceleration", "hard", "margin"}
     named = {n.rsplit(" ", 1)[0]: n.rsplit(" ", 1)[1] for n in names if n.endswith(("upper", "lower"))}
     for joint, side in named.items():
         index, _ = legarm.joint_index(joint)

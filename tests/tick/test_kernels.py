@@ -130,5 +130,5 @@ def test_the_linear_solve_finds_the_solvers_step_and_multipliers(
     for _ in range(200):
         loop.step()
     assert found_active > 10, "hardly a limit was ever active: the test shows nothing"
-    assert np.mean(hits) > 0.8
+    assert np.mean(hits) > 0.7  # joints that run into limits and out again, within their acceleration
     assert not all(hits), "the solver was never needed: the test shows nothing"

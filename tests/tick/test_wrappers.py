@@ -151,3 +151,15 @@ def test_a_loop_is_gone_when_nobody_has_it_and_its_ticks_still_say_why(legarm: w
     del loop
     assert gone() is None
     assert str(tick.why("load")) == said
+
+
+def test_a_given_joint_may_be_a_hair_beyond_its_limit(legarm: wb.Robot) -> None:
+    """pi/2, where the URDF has its first eleven digits."""
+    joint = "limb1_finger_a"
+    limit = legarm.joint_limits(joint)[1]
+    assert 0.0 < np.pi / 2 - limit < 1e-11
+    moved = wb.Phase("close", driven={joint: np.pi / 2}, duration=0.5, limits=[wb.JointLimits()])
+    loop = wb.Loop(legarm, moved, legarm.state("stand"), dt=0.01, backend="placo")
+    for _ in range(60):
+        tick = loop.step()
+    assert tick.q[legarm.joint_index(joint)[0]] == pytest.approx(np.pi / 2, abs=1e-12)

@@ -231,3 +231,25 @@ def test_a_store_tells_the_last_of_everything_said(said):
     heard = [umsgpack.unpackb(message) for message in store.messages()]
     assert {(m["path"], m["property"]): m["value"] for m in heard} == {(p, k): v for p, k, v in said}
     assert len(heard) == len({(p, k) for p, k, _ in said})
+
+
+def test_planned_forces_grow_with_their_arrows_and_cones_stand_at_the_feet(bundle):
+    motion = bundle.trajectory
+    frames = [contact["frame"] for contact in bundle.phases[0]["contacts"]]
+    rising = np.linspace(0.0, 20.0, len(motion))[:, None] * np.array([0.0, 0.0, 1.0])
+    forced = dataclasses.replace(motion, forces=dict.fromkeys(frames, rising))
+    played = Played(dataclasses.replace(bundle, trajectory=forced))
+    end = float(motion.time[-1] - motion.time[0])
+    for frame in frames:
+        path = f"/wbplan/planned_forces/{frame}"
+        half, full = played.at(path, ".scale", 0.5 * end)[2], played.at(path, ".scale", end)[2]
+        assert full == pytest.approx(2.0 * half, rel=0.05)
+        assert not played.shown(path, 0.0)  # nothing is drawn of no force
+        assert played.shown(path, end)
+    assert len(played.drawn("planned_forces")) == len(frames)
+    assert len(played.drawn("cones")) >= len(frames)
+
+
+def test_a_plan_without_forces_draws_none(bundle):
+    played = Played(dataclasses.replace(bundle, trajectory=dataclasses.replace(bundle.trajectory, forces={})))
+    assert played.drawn("planned_forces") == played.drawn("cones") == []

@@ -12,7 +12,8 @@ import proxsuite
 from numpy.typing import NDArray
 
 from wbplan.diagnose import solve_error
-from wbplan.stack import UNBOUNDED, Stack
+from wbplan.joint_box import UNBOUNDED
+from wbplan.stack import Stack
 
 Array = NDArray[np.float64]
 

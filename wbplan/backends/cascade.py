@@ -158,7 +158,7 @@ class Cascade:
         self._sides = [np.zeros(rows, dtype=np.int64) for _ in stack.levels[1:]]
         self._above = [level.postured for level in stack.levels[:-1]]
         self._curvature = Curvature(stack)
-        self._reaches = np.array([stack.reach(column) for column in range(6, n)])
+        self._reaches = stack.box.reach
         self._gz, self._low, self._high = np.zeros(n), np.zeros(rows), np.zeros(rows)
         self._Hz, self._G = np.zeros(n * n), np.zeros(rows * n)
 
@@ -223,6 +223,7 @@ class Cascade:
         """(s,) the part of what is left undone that no step of `STEP` or less can mend."""
         stack = self._stack
         short_of_speed = np.abs(x[6:]) < (1.0 - 1e-9) * self._reaches
+        short_of_speed &= np.abs(x[6:] - stack.box.previous) < (1.0 - 1e-9) * stack.box.most
         stopped = 6 + np.flatnonzero((np.abs(multipliers.box[6:]) > ROUNDING) & short_of_speed)
         above = [self._rows_of(j) for j in range(k)]
         pushing = stack.C[multipliers.rows > ROUNDING]

@@ -5,6 +5,7 @@ it does not have is made up for here:
 
 - a carried body is a link of the URDF that it gets, so that tasks, mass and CoM see it;
 - it has no gain, so a soft target is put where the gained step leads;
+- it has no acceleration limits: its position limits follow the joints, one tick's box about them;
 - it has one weight a task, squared weights, and masks: a task of unequal weights becomes several;
 - its polygon must be clockwise, and one that is not is "infeasible" without a word;
 - hard rows that depend on each other make it throw. Such rows, contacts last, are given to it as soft ones of
@@ -27,8 +28,9 @@ from wbplan.backends.wrappers import WRAPPERS
 from wbplan.compiled import WORLD, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
+from wbplan.joint_box import UNBOUNDED
 from wbplan.qp import Solution
-from wbplan.stack import MARGIN_RESERVE, REGULARISATION, Stack
+from wbplan.stack import REGULARISATION, Stack
 
 Array = NDArray[np.float64]
 
@@ -61,7 +63,6 @@ class PlacoBackend:
                 )
         self._soft_labels: set[str] = set()
         self._patient = False
-        self._widened: set[int] = set()
         self._build()
 
     # -- once a phase ------------------------------------------------------------------------------------
@@ -168,51 +169,34 @@ class PlacoBackend:
     def _limits(self) -> None:
         stack, solver, robot = self._stack, self._solver, self._robot
         phase = stack.phase
-        limits = phase.phase.joint_limits
-        solver.enable_joint_limits(limits is not None)
-        solver.enable_velocity_limits(limits is not None)
-        if limits is not None:
-            given = {
-                driven.joint for driven in phase.driven
-            }  # a given motion may use all of the URDF's speed
-            for j, name in enumerate(phase.robot.joint_names):
-                share = 1.0 + 1e-6 if j in given else limits.speed
-                robot.set_velocity_limit(name, float(share * phase.model.velocityLimit[6 + j]))
-            self._admit_outsiders()
+        # Its joint limits, moved along each tick, are the tick's whole box, which the speed limits are in.
+        solver.enable_joint_limits(phase.phase.joint_limits is not None)
+        solver.enable_velocity_limits(False)
+        self._lower, self._upper = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
+        self._lower[7:], self._upper[7:] = -UNBOUNDED, UNBOUNDED
         self._polygon = None
         if phase.polygon is not None and phase.phase.support is not None:
             clockwise = [np.array(vertex) for vertex in phase.polygon.vertices[::-1]]
-            self._polygon = solver.add_com_polygon_constraint(clockwise, self._margin())
+            self._polygon = solver.add_com_polygon_constraint(clockwise, 0.0)
             self._polygon.configure("support polygon", "hard", 1.0)
 
-    def _admit_outsiders(self) -> None:
-        """A joint outside its limits may stay as far out as a tick at full speed leaves it."""
-        model, q, dt = self._stack.phase.model, self._stack.kinematics.q, self._stack.dt
-        low, high = model.lowerPositionLimit[7:], model.upperPositionLimit[7:]
-        outside = set(np.flatnonzero((q[7:] < low) | (q[7:] > high)).tolist())
-        limits = self._stack.phase.phase.joint_limits
-        for j in outside | self._widened:
-            reach = (limits.speed if limits else 1.0) * model.velocityLimit[6 + j] * dt * (1 - 1e-6)
-            lo = low[j] if q[7 + j] >= low[j] else min(low[j], q[7 + j] + reach)
-            hi = high[j] if q[7 + j] <= high[j] else max(high[j], q[7 + j] - reach)
-            self._robot.set_joint_limits(self._stack.phase.robot.joint_names[j], float(lo), float(hi))
-        self._widened = outside
-
     def _margin(self) -> float:
-        """The margin to ask for in this tick: less than promised while the CoM comes from outside."""
-        stack = self._stack
-        support = stack.phase.phase.support
-        if support is None:
-            return 0.0
-        inward = 0.0 if self._patient else support.recovery_speed * stack.dt
+        """The margin to ask for in this tick: what the CoM may leave of its distance to the nearest edge.
+
+        PlaCo has one margin for all edges; those further off are slowed down for as they come near.
+        """
+        least = float((self._stack.distances() - self._stack.closer).min())
+        if self._patient:
+            least = min(least, self._stack.margin)
         self._patient = False
-        return min(support.margin + MARGIN_RESERVE, stack.margin + inward)
+        return least
 
     # -- each tick ---------------------------------------------------------------------------------------
 
     def solve(self) -> Solution:
         """See `Backend.solve`."""
-        for mend in (self._soften, self._wait_for_margin):
+        ease = self._stack.ease
+        for mend in (ease, ease, self._soften, self._soften_all, self._wait_for_margin):
             try:
                 return Solution(self._solve())
             except RuntimeError:
@@ -228,6 +212,11 @@ class PlacoBackend:
         self._soft_labels |= _dependent(self._stack)
         self._build()
 
+    def _soften_all(self) -> None:
+        """What is missing may be less than PlaCo's solver can see: the tick's own correction sees it."""
+        self._soft_labels |= {label for label, _ in self._stack.hard_names()}
+        self._build()
+
     def _wait_for_margin(self) -> None:
         """Ask a CoM that is outside its margin only not to go further out."""
         self._patient = True
@@ -236,11 +225,14 @@ class PlacoBackend:
         stack, robot = self._stack, self._robot
         robot.state.q = stack.kinematics.q
         robot.update_kinematics()
+        stack.fill_box()
         self._aim()
+        here = stack.kinematics.q[stack.q_index]
+        self._lower[stack.q_index] = here + stack.lower[6:]
+        self._upper[stack.q_index] = here + stack.upper[6:]
         step: Array = self._solver.solve(False)
         if stack.driving:
             step[stack.driven] = stack.driven_step
-        stack.fill_box()
         step[stack.free] = np.minimum(np.maximum(step[stack.free], stack.lower), stack.upper)
         return step if stack.clearance is None else keep_apart(stack, step)
 
@@ -280,8 +272,6 @@ class PlacoBackend:
         self._regularisation.set_weight(stack.soft_damping())
         if self._polygon is not None:
             self._polygon.margin = self._margin()
-        if self._widened:
-            self._admit_outsiders()
 
     def _sort_frame_tasks(self) -> None:
         """Put what never moves in its place for good; list the rest by what `_aim` has to do."""

@@ -15,10 +15,14 @@ from numpy.typing import NDArray
 from wbplan.backends.cascade import Cascade
 from wbplan.backends.kkt import ActiveSetGuess
 from wbplan.diagnose import solve_error
+from wbplan.joint_box import UNBOUNDED
 from wbplan.qp import LevelSolution, Multipliers, Solution
-from wbplan.stack import UNBOUNDED, Stack
+from wbplan.stack import Stack
 
 Array = NDArray[np.float64]
+
+#: How sure ProxQP has to be that a problem has no solution.
+INFEASIBLE = 1e-20
 
 
 #: Costs and gradients above this are scaled down to it where the solver found no step.
@@ -47,7 +51,7 @@ class ProxqpBackend:
         qp.settings.eps_rel = 0.0
         qp.settings.default_rho = 1e-8  # the cost is strictly convex as it is
         # Steps are millimetres: its usual measure takes rows that nearly agree for contradictions.
-        qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = 1e-14
+        qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = INFEASIBLE
         qp.settings.max_iter = qp.settings.max_iter_in = 200  # inner ones go to 1500 for each outer otherwise
         qp.settings.check_duality_gap = False
         # Chosen before init: proxsuite 0.8 crashes when it changes between init and the first solve.
@@ -71,13 +75,14 @@ class ProxqpBackend:
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
         s = self._stack
-        if not (self._run() or self._retry() or (s.relax() and self._retry())):
+        if not (self._run() or self._retry() or self._eased() or (s.relax() and self._retry())):
             raise solve_error(s, "the QP has no solution")
         results, rows = self._qp.results, len(s.d)
         y, z = self._scale * np.array(results.y), self._scale * np.array(results.z)
         found = Multipliers(y, z[:rows], z[rows:])
         self._guess.learn(found)
-        return np.array(results.x), found
+        # With its active bounds known, one linear solve is sharper than the solver's tolerance.
+        return self._guess.solve() or (np.array(results.x), found)
 
     def _run(self) -> bool:
         s = self._stack
@@ -96,6 +101,13 @@ class ProxqpBackend:
         # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
         return bool(self._qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
 
+    def _eased(self) -> bool:
+        """With less care for stopping, where hard tasks lead on."""
+        while self._stack.ease():
+            if self._retry():
+                return True
+        return False
+
     def _retry(self) -> bool:
         """Once more from nothing, with patience, and slow to call it infeasible.
 
@@ -105,7 +117,7 @@ class ProxqpBackend:
         qp = self._qp = self._new_solver()
         self._started = False  # the next tick begins anew: this solver's patience is not for every tick
         qp.settings.max_iter, qp.settings.max_iter_in = 200, 50  # or rows that clash keep it for minutes
-        qp.settings.eps_primal_inf = 1e-12
+        qp.settings.eps_primal_inf = INFEASIBLE
         self._scale = max(1.0, float(np.abs(s.g).max()) / LARGE, float(np.abs(s.H).max()) / LARGE)
         H, g = s.H / self._scale, s.g / self._scale
         qp.init(H, g, s.A, s.b, s.C, self._unbounded, s.d, s.lower, s.upper)

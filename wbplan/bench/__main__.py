@@ -14,6 +14,7 @@ from rich.console import Console
 
 from wbplan.bench.breakdown import breakdown_table
 from wbplan.bench.clearance import clearance_text
+from wbplan.bench.forces import forces_table
 from wbplan.bench.levels import levels_text
 from wbplan.bench.race import COLD, ROUND, race
 from wbplan.bench.report import Row, rows_of, table_of, write_json
@@ -51,6 +52,9 @@ def main(args: Sequence[str] | None = None) -> int:
             console.print()
             rows += rows_of(name, laps)
             same_work &= not any(lap.faults for lap in laps)
+        if not options.profile:
+            console.print(forces_table())
+            console.print()
         console.print(_circumstances(options.ticks))
         if rows:
             write_json(rows, options.out)

@@ -17,9 +17,9 @@ from wbplan.bundle import places
 from wbplan.errors import BundleError
 
 PLAN, URDF, ARRAYS, TABLE = "plan.json", "robot.urdf", "trajectory.npz", "trajectory.csv"
-SCENE, PLOTS = "scene.html", "plots.png"
+SCENE, PLOTS, FORCES = "scene.html", "plots.png", "forces.png"
 PHYSICS = ("physics.json", "physics.png")  # of an older plan they would tell lies
-FILES = (PLAN, URDF, ARRAYS, TABLE, SCENE, PLOTS, *PHYSICS)
+FILES = (PLAN, URDF, ARRAYS, TABLE, SCENE, PLOTS, FORCES, *PHYSICS)
 
 
 def is_bundle(folder: Path) -> bool:

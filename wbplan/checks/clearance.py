@@ -25,7 +25,7 @@ from wbplan.checks.solids import Solids, Unreadable
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-TOUCH = 0.002  #: [m], how far what may touch may go in
+TOUCH = 0.005  #: [m], how far what may touch may go in
 NEAR = 0.01  #: [m], how near to a foot's frame a shape of its link counts as the foot's
 SLACK = 2e-6  #: [m], what the two libraries' distances may differ by
 SEEN = 0.03  #: [m] beyond the bound up to which distances are measured
@@ -73,6 +73,39 @@ def rows(bundle: Bundle, replay: Replay, folders: tuple[Path, ...] = ()) -> list
     if nothing:  # a promise must not pass because there was nothing to look at
         return _cannot(replay, promising[0], "there are no shapes to measure")
     return [*clear.rows(), *touch.rows()]
+
+
+def nearest(
+    bundle: Bundle, samples: Ints, folders: tuple[Path, ...] = ()
+) -> list[tuple[str, float, Array, Array]]:
+    """The pair that is nearest at each sample, of those whose distance its phase promises.
+
+    Returns:
+        Names, distance [m] and the two points (3,) in the world; nan where nothing is near or promised.
+    """
+    nothing = ("", float("nan"), np.full(3, np.nan), np.full(3, np.nan))
+    found = [nothing] * len(samples)
+    replay = Replay.of(bundle)
+    try:
+        solids = Solids(bundle, folders)
+    except Unreadable:
+        return found
+    for window in replay.windows:
+        if "clearance" not in window.promises:
+            continue
+        pairs = _pairs(solids, bundle, window)
+        own = np.flatnonzero(pairs.promised)
+        if not len(own):
+            continue
+        first, second = pairs.first[own], pairs.second[own]
+        for i in np.flatnonzero(bundle.trajectory.phase[samples] == window.index):
+            solids.place(int(samples[i]))
+            gaps = solids.distances(first, second, pairs.bound[own] + SEEN)
+            p = int(gaps.argmin())
+            if gaps[p] < pairs.bound[own][p] + SEEN:
+                names = f"{solids.owner[first[p]]} - {solids.owner[second[p]]}"
+                found[i] = (names, float(gaps[p]), *solids.between(int(first[p]), int(second[p])))
+    return found
 
 
 def _cannot(replay: Replay, window: Window, why: str) -> list[Row]:

@@ -140,6 +140,12 @@ class Solids:
             )
         return found
 
+    def between(self, a: int, b: int) -> tuple[Array, Array]:
+        """The nearest points (3,) of two shapes as they are placed, world."""
+        ends = np.zeros(6)
+        mujoco.mj_geomDistance(self.model, self.data, a, b, FAR, ends)
+        return ends[:3].copy(), ends[3:].copy()
+
 
 def _joint(bundle: Bundle, name: str) -> Array:
     """(N,) of one joint; a continuous one, stored as cosine and sine, as its angle."""

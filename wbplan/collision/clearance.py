@@ -241,11 +241,15 @@ class Clearance:
         return bool(kernels.all_kept(self.spare, self._allowed))
 
     def write(
-        self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float
-    ) -> None:
-        """The rows C x <= d of the next step, x over the free columns; `nothing` in d for unused rows."""
+        self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float,
+        share: float = SHARE,
+    ) -> None:  # fmt: skip
+        """The rows C x <= d of the next step, x over the free columns; `nothing` in d for unused rows.
+
+        `share` of what is left of a distance is what a step may use up.
+        """
         least = np.full(len(self.spare), -RECOVERY * self._dt)
-        self._fill(jacobian, free, driven, step, C, d, nothing, SHARE, least)
+        self._fill(jacobian, free, driven, step, C, d, nothing, share, least)
 
     def relax(
         self, jacobian: Array, free: Any, driven: Any, step: Array, C: Array, d: Array, nothing: float

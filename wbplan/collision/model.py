@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: How far [m] what may touch an obstacle may go into it: soles are balls about a point that is held.
-TOUCH = 0.002
+TOUCH = 0.005
 
 #: A shape that reaches this near [m] to the frame of a foot whose link has no shape is the foot's.
 NEAR = 0.01

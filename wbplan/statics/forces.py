@@ -86,6 +86,8 @@ class ForceQP:
         self._qp.settings.eps_abs = 1e-8
         self._qp.settings.initial_guess = proxsuite.proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
         self._fresh = True
+        self._standing: tuple[bytes, bytes, float] | None = None
+        self._A, self._nothing = np.zeros((6, 3 * count)), np.zeros(3 * count)
 
     def solve(
         self,
@@ -106,6 +108,7 @@ class ForceQP:
             S: (6,) the diagonal of the residual's weight.
             bounds: rows (joints, 3 C) and what they have at least and at most (joints,).
         """
+        self._standing = None
         weighted = A.T * S
         hessian, gradient = weighted @ A + H, -(weighted @ w + g)
         if self._fresh:
@@ -134,10 +137,17 @@ class ForceQP:
             about: the point, such as the CoM.
             alpha: weight of |f|^2 beside the residual's.
         """
-        A = grasp_map(points, about)
-        size = A.shape[1]
-        f = self.solve(A, wrench, alpha * np.eye(size), np.zeros(size), np.ones(6))
-        return f.reshape(-1, 3), float(np.linalg.norm(A @ f - wrench))
+        key = (points.tobytes(), about.tobytes(), alpha)
+        if key != self._standing:
+            self._A = grasp_map(points, about)
+            self.solve(self._A, wrench, alpha * np.eye(self._A.shape[1]), self._nothing, np.ones(6))
+            self._standing = key
+        else:  # the same feet, another wrench: the factors of the Hessian stay
+            self._qp.update(g=-(self._A.T @ wrench))
+            self._qp.solve()
+        f = np.array(self._qp.results.x)
+        left = self._A @ f - wrench
+        return f.reshape(-1, 3), float(np.sqrt(left @ left))
 
 
 def within(forces: Array, G: Array, upper: Array, slack: float = 1e-9) -> NDArray[np.bool_]:

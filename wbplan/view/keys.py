@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -44,3 +47,12 @@ def apart(places: Array, step: float) -> NDArray[np.int64]:
 def quaternions(rotations: Array) -> Array:
     """(N, 3, 3) -> (N, 4), x y z w."""
     return np.array([pin.Quaternion(R).coeffs() for R in rotations])
+
+
+def holding(phases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
+    """The frames that hold something or close a loop."""
+    for phase in phases:
+        for closure in phase.get("closures", ()):
+            yield from (closure["frame_a"], closure["frame_b"])
+        for carried in phase.get("carried", ()):
+            yield carried["frame"]

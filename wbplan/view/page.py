@@ -7,8 +7,9 @@ import gzip
 import html
 import re
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import resources
+from typing import Any
 
 
 def live_page(title: str) -> str:
@@ -46,3 +47,8 @@ def _page(title: str, start: str) -> str:
     # Pieces between the marks, and the marks' names, in turn: what is put in is not searched again.
     pieces = re.split(r"@(\w+)@", (here / "page.html").read_text(encoding="utf-8"))
     return "".join(parts[piece] if i % 2 else piece for i, piece in enumerate(pieces))
+
+
+def title_of(plan: Mapping[str, Any]) -> str:
+    """What a plan is called: its task and its robot."""
+    return f"{plan.get('task', 'plan')}, {plan.get('robot', 'robot')}"

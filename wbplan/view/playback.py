@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import html
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from wbplan.errors import SpecError, ViewError
 from wbplan.geometry import support_polygon
 from wbplan.view import shapes
+from wbplan.view.collisions import draw_collisions
 from wbplan.view.drawing import DISC_Z, GRADES, Drawing, body_sizes, box_corners, grade, node, pose7
 from wbplan.view.figure import Figure
 from wbplan.view.forces import draw_forces
 from wbplan.view.ghost import Ghost, draw_ghost
-from wbplan.view.keys import FINE, apart, changes, pick, quaternions
+from wbplan.view.keys import FINE, apart, changes, holding, pick, quaternions
 from wbplan.view.messages import SetAnimation, Store, Track, Window, floats
-from wbplan.view.page import still_page
+from wbplan.view.page import still_page, title_of
 from wbplan.view.scene import facing, scale
 from wbplan.view.server import Server
 from wbplan.view.terrain import is_grid
@@ -40,6 +41,7 @@ def serve(
     *,
     package_dirs: Sequence[str | Path] = (),
     ghost: Ghost | None = None,
+    collisions: bool = False,
 ) -> Server:
     """Serves a plan's animation; the page repeats it until told otherwise.
 
@@ -49,6 +51,7 @@ def serve(
         port: port to listen on; None takes a free one.
         package_dirs: where the robot's meshes are looked for.
         ghost: a second robot, simulated, seen beside the planned one.
+        collisions: also draw the collision shapes, and a rod between what is nearest to each other.
 
     Returns:
         The running server: `.url`, `.wait()`, `.stop()`.
@@ -56,9 +59,9 @@ def serve(
     Raises:
         ViewError: the port is taken, the host is none of this machine, or a mesh is missing.
     """
-    server = Server(host, port, title=_title(bundle))
+    server = Server(host, port, title=title_of(bundle.plan))
     try:
-        draw_plan(bundle, server, package_dirs=package_dirs, ghost=ghost)
+        draw_plan(bundle, server, package_dirs=package_dirs, ghost=ghost, collisions=collisions)
     except BaseException:
         server.stop()
         raise
@@ -72,6 +75,7 @@ def play(
     *,
     package_dirs: Sequence[str | Path] = (),
     ghost: Ghost | None = None,
+    collisions: bool = False,
 ) -> None:
     """Serves a plan's animation, prints where, and returns when Ctrl-C is pressed.
 
@@ -81,31 +85,33 @@ def play(
         port: port to listen on; None takes a free one.
         package_dirs: where the robot's meshes are looked for.
         ghost: as `serve` takes it.
+        collisions: likewise.
 
     Raises:
         ViewError: as `serve` does.
     """
-    with serve(bundle, host, port, package_dirs=package_dirs, ghost=ghost) as server:
+    with serve(bundle, host, port, package_dirs=package_dirs, ghost=ghost, collisions=collisions) as server:
         try:  # from the moment that Ctrl-C is offered
-            print(f"{_title(bundle)}: {server.url} (Ctrl-C ends it)", flush=True)
+            print(f"{title_of(bundle.plan)}: {server.url} (Ctrl-C ends it)", flush=True)
             server.wait()
         except KeyboardInterrupt:
             return
 
 
-def page(bundle: Bundle, *, package_dirs: Sequence[str | Path] = ()) -> str:
+def page(bundle: Bundle, *, package_dirs: Sequence[str | Path] = (), collisions: bool = False) -> str:
     """A plan's animation as one web page that needs no server and no network.
 
     Args:
         bundle: the plan.
         package_dirs: where the robot's meshes are looked for.
+        collisions: as `serve` takes it.
 
     Raises:
         ViewError: a mesh is missing.
     """
     store = Store()
-    draw_plan(bundle, store, package_dirs=package_dirs)
-    return still_page(_title(bundle), store.messages())
+    draw_plan(bundle, store, package_dirs=package_dirs, collisions=collisions)
+    return still_page(title_of(bundle.plan), store.messages())
 
 
 def write_html(bundle: Bundle, path: str | Path, *, package_dirs: Sequence[str | Path] = ()) -> None:
@@ -132,28 +138,40 @@ def write_html(bundle: Bundle, path: str | Path, *, package_dirs: Sequence[str |
             part.unlink()
 
 
-def inline(bundle: Bundle, *, height: int = 520, package_dirs: Sequence[str | Path] = ()) -> Any:
+def inline(
+    bundle: Bundle,
+    *,
+    height: int = 520,
+    package_dirs: Sequence[str | Path] = (),
+    collisions: bool = False,
+) -> Any:
     """A plan's animation as a notebook's output, which still works after the kernel has ended.
 
     Args:
         bundle: the plan.
         height: of the cell's output, in pixels.
         package_dirs: where the robot's meshes are looked for.
+        collisions: as `serve` takes it.
 
     Returns:
         An `IPython.display.HTML`.
     """
     from IPython import display
 
-    text = html.escape(page(bundle, package_dirs=package_dirs), quote=True)
+    text = html.escape(page(bundle, package_dirs=package_dirs, collisions=collisions), quote=True)
     style = f"width: 100%; height: {int(height)}px; border: 0; border-radius: 8px"
-    title = html.escape(_title(bundle))
+    title = html.escape(title_of(bundle.plan))
     show: Any = display.HTML
     return show(f'<div><iframe srcdoc="{text}" style="{style}" title="{title}"></iframe></div>')
 
 
 def draw_plan(
-    bundle: Bundle, target: Window, *, package_dirs: Sequence[str | Path] = (), ghost: Ghost | None = None
+    bundle: Bundle,
+    target: Window,
+    *,
+    package_dirs: Sequence[str | Path] = (),
+    ghost: Ghost | None = None,
+    collisions: bool = False,
 ) -> None:
     """Draws a plan with its whole motion into a window.
 
@@ -162,11 +180,12 @@ def draw_plan(
         target: a `Server` or a `Store`.
         package_dirs: where the robot's meshes are looked for.
         ghost: as `serve` takes it.
+        collisions: likewise.
 
     Raises:
         ViewError: the plan has no samples, or a mesh is missing.
     """
-    _Playback(bundle, target, package_dirs).draw(ghost)
+    _Playback(bundle, target, package_dirs).draw(ghost, collisions)
 
 
 class _Playback:
@@ -174,6 +193,7 @@ class _Playback:
 
     def __init__(self, bundle: Bundle, target: Window, package_dirs: Sequence[str | Path]) -> None:
         self.plan: Mapping[str, Any] = bundle.plan
+        self.bundle, self.package_dirs = bundle, package_dirs
         self.trajectory, self.obstacles = bundle.trajectory, bundle.obstacles
         if len(self.trajectory.time) == 0:
             raise ViewError("view: the plan has no samples, nothing can be shown")
@@ -187,10 +207,10 @@ class _Playback:
         self.feet = list(dict.fromkeys(c["frame"] for phase in self.phases for c in phase["contacts"]))
         self.pushing = list(self.trajectory.forces)
         # A closure may also name a carried body, which the robot's model does not have.
-        self.tips = [name for name in dict.fromkeys(_holding(self.phases)) if self.figure.has(name)]
+        self.tips = [name for name in dict.fromkeys(holding(self.phases)) if self.figure.has(name)]
         self.tracks: list[Track] = []
 
-    def draw(self, ghost: Ghost | None = None) -> None:
+    def draw(self, ghost: Ghost | None = None, collisions: bool = False) -> None:
         """Draws everything; the animation, which binds to what is there, last."""
         self._kinematics()
         self._robot()
@@ -204,6 +224,9 @@ class _Playback:
         self._trails()
         self._camera(boxes)
         self._story()
+        if collisions:
+            shown = (self.picked, self.time, self.package_dirs)
+            self.tracks += draw_collisions(self.draw_in, self.bundle, *shown)
         if ghost is not None:
             self.tracks += draw_ghost(ghost, self.draw_in, self.figure, self.time)
         self.draw_in.window.send(SetAnimation(self.tracks, self.duration))
@@ -337,7 +360,7 @@ class _Playback:
         first = float(self.trajectory.time[0])
         starts = [float(phase["start"]) - first for phase in self.phases]
         story = {
-            "title": _title_of(self.plan),
+            "title": title_of(self.plan),
             "duration": self.duration,
             "names": [str(phase["name"]) for phase in self.phases],
             "starts": starts,
@@ -375,20 +398,3 @@ class _Playback:
             return
         first = np.flatnonzero(np.append(True, shown[1:] != shown[:-1]))
         self.tracks.append(Track(path, "visible", self.time[first], shown[first]))
-
-
-def _holding(phases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
-    """The frames that hold something or close a loop."""
-    for phase in phases:
-        for closure in phase.get("closures", ()):
-            yield from (closure["frame_a"], closure["frame_b"])
-        for carried in phase.get("carried", ()):
-            yield carried["frame"]
-
-
-def _title_of(plan: Mapping[str, Any]) -> str:
-    return f"{plan.get('task', 'plan')}, {plan.get('robot', 'robot')}"
-
-
-def _title(bundle: Bundle) -> str:
-    return _title_of(bundle.plan)

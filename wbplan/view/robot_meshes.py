@@ -49,7 +49,11 @@ class LinkMesh:
 
 
 def robot_meshes(
-    urdf_text: str, *, urdf_dir: Path | None = None, package_dirs: Sequence[str | Path] = ()
+    urdf_text: str,
+    *,
+    urdf_dir: Path | None = None,
+    package_dirs: Sequence[str | Path] = (),
+    collisions: bool = False,
 ) -> list[LinkMesh]:
     """The visual shapes of every link; the collision shapes where the robot has no visual ones at all.
 
@@ -57,6 +61,7 @@ def robot_meshes(
         urdf_text: content of the URDF.
         urdf_dir: folder from which relative mesh names count; the working folder if absent.
         package_dirs: where `package://` names and relative ones are looked for as well.
+        collisions: the collision shapes in any case.
 
     Raises:
         ModelError: the text is not a URDF, or a shape is not one.
@@ -65,7 +70,8 @@ def robot_meshes(
     robot = _parse(urdf_text)
     colours = _named_colours(robot)
     folders = [urdf_dir or Path(), *(Path(folder) for folder in package_dirs)]
-    kind = "visuals" if any(link.visuals for link in robot.links) else "collisions"
+    seen = not collisions and any(link.visuals for link in robot.links)
+    kind = "visuals" if seen else "collisions"
     meshes: list[LinkMesh] = []
     for link in robot.links:
         parts: dict[float, list[tuple[Any, Array]]] = {}

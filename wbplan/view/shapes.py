@@ -73,6 +73,13 @@ def cone(normal: ArrayLike, friction: float, height: float, colour: Colour) -> A
     return mc.Mesh(mc.TriangularMeshGeometry(vertices, sides), flat(colour, 0.16))
 
 
+def rod(radius: float, colour: Colour) -> Any:
+    """A rod from the origin to (0, 0, 1), seen through whatever is before it."""
+    vertices, faces = _spike(np.zeros(3), np.array([0.0, 0.0, 1.0]), radius, pointed=False)
+    material = mc.MeshBasicMaterial(color=colour, depthTest=False, transparent=True, opacity=0.95)
+    return mc.Mesh(mc.TriangularMeshGeometry(vertices, faces), material)
+
+
 def sphere(radius: float, colour: Colour) -> Any:
     """A ball that is seen through whatever is before it."""
     material = mc.MeshLambertMaterial(color=colour, opacity=0.9, depthTest=False)
