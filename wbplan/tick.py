@@ -20,20 +20,20 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.active import Active, HeldBack
-from wbplan.backends import Backend, make_backend
+from wbplan.backends import make_backend
 from wbplan.bodies import Body
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
-from wbplan.joint_box import Pace
 from wbplan.paths import number, vector
 from wbplan.qp import Solution
+from wbplan.replay import Replay
 from wbplan.retract import DRIFT, Retraction
 from wbplan.robot import Robot
 from wbplan.script import Phase
 from wbplan.stack import Stack
 from wbplan.state import State
-from wbplan.why import Why, active_sets, explain, keep_goals, put_goals
+from wbplan.why import Why, keep_goals
 
 Array = NDArray[np.float64]
 
@@ -175,7 +175,7 @@ class Loop:
         self._backend = make_backend(backend, self.stack)
         self._retraction = Retraction(self.stack)
         self.last: Tick | None = None
-        self._second: tuple[Stack, Backend | None] | None = None
+        self._replay = Replay(self.compiled, self.dt)
         self._begin(velocity, rest_at, braking)
 
     def _begin(self, velocity: Array | None, rest_at: float | None, braking: Array | None) -> None:
@@ -269,33 +269,13 @@ class Loop:
             raise
         self.q, self.t = new, ends
         taken = pin.difference(self.compiled.model, q, new)
-        replay = partial(self._why, q, began, keep_goals(stack), stack.box.keep_pace(), solution)
+        pace = stack.box.keep_pace()
+        replay = partial(self._replay.why, self.backend, q, began, keep_goals(stack), pace, solution)
         held_back = HeldBack(stack, solution)
         self.velocity = taken / self.dt
         stack.box.took(taken[stack.free], stack.kinematics.com - com)
         self.last = Tick(self, self.velocity, held_back, replay, started)
         return self.last
-
-    def _why(
-        self, q: Array, t: float, goals: tuple[Array, ...], pace: Pace, solution: Solution, task: str,
-        part: str | None,
-    ) -> Why:  # fmt: skip
-        """A tick again, on a stack of its own: the loop has moved on."""
-        if self._second is None:
-            stack = Stack(self.compiled, self.dt)
-            self._second = stack, make_backend(self._backend.name, stack) if solution.multipliers else None
-        stack, backend = self._second
-        stack.aim(t)
-        put_goals(stack, goals)
-        stack.measure(q)
-        stack.box.put_pace(pace)
-        stack.advance(t)
-        put_goals(stack, goals)
-        if backend is None:
-            stack.assemble()
-        else:
-            solution = backend.solve()
-        return explain(stack, active_sets(stack, solution), task, part)
 
     def _solve(self) -> Solution:
         """What the backend finds; whatever its library throws is a `SolveError`."""

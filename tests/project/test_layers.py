@@ -49,6 +49,7 @@ LAYERS = [
     "why",
     "retract",
     "backends",
+    "replay",
     "tick",
     "fallback",
     "bundle",

@@ -50,14 +50,18 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
     out = Outcome()
     robot = any_robot(rng)
     state = start_of(rng, robot)
-    q, roles = np.array(state.q), None
+    q, roles, velocity = np.array(state.q), None, None
     placed: dict[str, Any] = {}
     dt = rng.choice((0.001, 0.002, 0.005, 0.01, 0.02))
     for k in range(rng.randint(1, 4)):
         backend = rng.choice(("proxqp", "placo"))
         try:
             made = scene(rng, robot, robot.state(q), f"phase{k}")
-            loop = wb.Loop(robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles)
+            if len(made.phase.levels) > 1:
+                backend = "proxqp"  # the one that has levels
+            loop = wb.Loop(
+                robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles, velocity=velocity
+            )
         except wb.WbplanError as error:
             out.counts[f"phase refused: {kind_of(error)}"] += 1
             continue
@@ -65,10 +69,12 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
         held = {h.body.name: h.T_holder_body for h in loop.compiled.held}
         polygon = loop.compiled.polygon
         region = (polygon.normals, polygon.offsets) if polygon is not None and loop.compiled.region else None
-        watch = Watch(robot, made.phase, q, dt, held, region)
+        bounds = loop.compiled.acceleration
+        watch = Watch(robot, made.phase, q, dt, held, region, bounds, velocity)
         _run_phase(rng, loop, made, watch, out, backend, min(LONGEST, most - out.ticks))
         out.add({}, watch.worst, [])
         q, roles = np.array(loop.q), loop.compiled.roles
+        velocity = np.array(loop.velocity) if rng.random() < 0.5 else None
         if out.found or out.ticks >= most:
             break
     return out
@@ -101,10 +107,28 @@ def _run_phase(
             str(tick.active)
             if not np.isfinite(list(tick.errors.values())).all():
                 out.found.append(f"an error that is not finite: {dict(tick.errors)} ({backend})")
+            _ask_why(rng, tick, out, backend)
         broken = watch.see(tick)
         if broken:
             out.found += [f"{what} ({backend}, {loop.compiled.robot.name})" for what in broken]
             return
+
+
+def _ask_why(rng: random.Random, tick: Any, out: Outcome, backend: str) -> None:
+    """What holds a task back, while the loop goes on."""
+    tasks = [name.rsplit(".", 1) for name in tick.errors if not name.startswith("contact(")]
+    if not tasks:
+        return
+    task, part = rng.choice(tasks)
+    try:
+        why = tick.why(task, part)
+    except wb.WbplanError as error:
+        out.counts[f"why refused: {kind_of(error)}"] += 1
+        return
+    out.counts["asked why"] += 1
+    gains = [reason.gain_per_unit for reason in why.reasons]
+    if not (np.isfinite(gains).all() and str(why)):
+        out.found.append(f"why of '{task}' is not finite: {why} ({backend})")
 
 
 def kind_of(error: wb.WbplanError) -> str:

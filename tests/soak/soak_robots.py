@@ -114,7 +114,9 @@ def _link(name: str, mass: float, z: float = 0.0) -> str:
     i = f"{mass * 0.01:.6f}"
     return (
         f'<link name="{name}"><inertial><origin xyz="0 0 {z:.6f}"/><mass value="{mass:.6f}"/>'
-        f'<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        f'<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial>'
+        f'<collision><origin xyz="0 0 {z:.6f}"/><geometry><sphere radius="0.02"/></geometry></collision>'
+        "</link>"
     )
 
 

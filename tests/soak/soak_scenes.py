@@ -72,9 +72,10 @@ def scene(rng: random.Random, robot: wb.Robot, state: wb.State, name: str) -> Sc
         hard.append(wb.RelativePoseTask(hands[1], root=hands[0], target=wb.AS_IS))
     if rng.random() < 0.2:
         soft.append(wb.DampingTask(weight=rng.choice((1e-3, 0.1, 10.0))))
-    limits: list[Any] = (
-        [wb.JointLimits(speed=rng.choice((1.0, 1.0, 0.5, 0.05)))] if rng.random() < 0.97 else []
-    )
+    limits: list[Any] = [_joint_limits(rng, robot)] if rng.random() < 0.97 else []
+    if rng.random() < 0.3:
+        nearest = rng.choice((0.0, 0.005, 0.02))
+        limits.append(wb.SelfCollision(distance=nearest, influence=nearest + 0.04))
     if len(stands) > 2 and rng.random() < 0.8:
         limits.append(wb.SupportPolygon(margin=rng.choice((0.0, 0.01, 0.02, -0.05, 0.1))))
     out.phase = wb.Phase(
@@ -82,12 +83,32 @@ def scene(rng: random.Random, robot: wb.Robot, state: wb.State, name: str) -> Sc
         contacts=[wb.Contact(foot) for foot in stands],
         carried=_load(rng, [*hands, frames[0]], name),
         hard=hard,
-        soft=soft,
+        soft=_levels(rng, soft),
         limits=limits,
         duration=rng.choice((0.2, DURATION, 5.0)),
         **_given(rng, robot),
     )
     return out
+
+
+def _joint_limits(rng: random.Random, robot: wb.Robot) -> wb.JointLimits:
+    """Speeds, accelerations for all joints or for some, seldom a jerk."""
+    named = rng.sample(robot.joint_names, min(3, len(robot.joint_names)))
+    by_joint = {name: rng.choice((0.5, 20.0, 300.0)) for name in named}
+    return wb.JointLimits(
+        speed=rng.choice((1.0, 1.0, 0.5, 0.05)),
+        acceleration=rng.choice((None, None, 1.0, 20.0, 1000.0, by_joint)),
+        jerk=rng.choice((None,) * 9 + (500.0,)),
+    )
+
+
+def _levels(rng: random.Random, soft: list[Any]) -> list[Any]:
+    """As they are, or, one time in four, in two or three levels, the order by chance."""
+    if len(soft) < 2 or rng.random() > 0.25:
+        return soft
+    soft = rng.sample(soft, len(soft))
+    cuts = sorted(rng.sample(range(1, len(soft)), min(len(soft) - 1, rng.choice((1, 2)))))
+    return [soft[a:b] for a, b in zip([0, *cuts], [*cuts, len(soft)], strict=True)]
 
 
 def _root(robot: wb.Robot) -> str:

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from soak_distances import Distances
 
 import wbplan as wb
 
 CLOSED, TURNED = 1e-4, 1e-3  #: [m], [rad]
 ROUNDING = 1e-9
+NEARER = 1e-5  #: [m], what two libraries' distances may differ by
 
 
 class Watch:
     """What a phase promised when it began, against what its ticks do.
+
+    Args:
+        region: normals and offsets of a polygon that is not the contacts' hull.
+        acceleration: (n,) of every joint, where the phase names none [rad/s^2, m/s^2].
+        velocity: (nv,) before the first tick; at rest.
 
     Attributes:
         worst: promise -> the largest share of its bound that was used; above 1 it is broken.
     """
 
     def __init__(
-        self, robot: wb.Robot, phase: wb.Phase, q: Any, dt: float, held: dict[str, Any], region: Any = None
-    ) -> None:
+        self, robot: wb.Robot, phase: wb.Phase, q: Any, dt: float, held: dict[str, Any], region: Any = None,
+        acceleration: Any = None, velocity: Any = None,
+    ) -> None:  # fmt: skip
         self.model = pin.buildModelFromXML(robot.urdf_text, pin.JointModelFreeFlyer())
         self.data = self.model.createData()
         self.phase, self.dt, self.held = phase, dt, held
@@ -35,6 +44,11 @@ class Watch:
         for name in given:  # a given motion may use all of the URDF's speed
             k = robot.joint_index(name)[1] - 6
             self.reach[k] = self.model.velocityLimit[6 + k] * dt * 1.001
+        self._accelerations(robot, phase, given, acceleration, velocity)
+        self.distances, self.bound = None, 0.0
+        if phase.self_collision is not None:
+            self.distances, self.bound = Distances(robot, self.model), phase.self_collision.distance
+            self.apart = self.distances.at(self.q)
         self._place(self.q)
         self.anchors = {c.frame: self._pose(c.frame).translation.copy() for c in phase.contacts}
         self.loops = {pair: self._between(*pair) for pair in phase.closures}
@@ -44,6 +58,25 @@ class Watch:
         else:
             self.edges = region or _edges(np.array([p[:2] for p in self.anchors.values()]))
         self.before = self._margin()
+
+    def _accelerations(
+        self, robot: wb.Robot, phase: wb.Phase, given: set[str], bound: Any, velocity: Any
+    ) -> None:
+        """(n,) by how much each joint's step may differ from the last; what is given has no bound."""
+        self.step = np.zeros(self.model.nv - 6) if velocity is None else np.array(velocity[6:]) * self.dt
+        self.change = np.full(self.model.nv - 6, np.inf)
+        limits = phase.joint_limits
+        if limits is None:
+            return
+        if bound is not None:
+            self.change[:] = np.array(bound) * self.dt**2
+        if isinstance(limits.acceleration, Mapping):
+            for name, value in limits.acceleration.items():
+                self.change[robot.joint_index(name)[1] - 6] = value * self.dt**2
+        elif limits.acceleration is not None:
+            self.change[:] = limits.acceleration * self.dt**2
+        for name in (*given, *phase.locked):
+            self.change[robot.joint_index(name)[1] - 6] = np.inf
 
     def _place(self, q: Any) -> None:
         pin.framesForwardKinematics(self.model, self.data, q)
@@ -90,6 +123,15 @@ class Watch:
             was = np.maximum(np.maximum(self.low - self.q[7:], self.q[7:] - self.high), 0.0)
             shares["position"] = float(((over - was + ROUNDING) / ROUNDING).max())
             shares["speed"] = float((np.abs(q[7:] - self.q[7:]) / (self.reach + 1e-12)).max()) / (1.0 + 1e-6)
+            step = v[6:] * self.dt
+            over = (np.abs(step - self.step) - 1e-12) / self.change
+            shares["acceleration"] = float(over.max()) / (1.0 + 1e-6)
+            self.step = step
+        if self.distances is not None:
+            apart = self.distances.at(q)
+            short = np.minimum(self.apart, self.bound) - apart
+            shares["clearance"] = max(float(short.max(initial=0.0)), 0.0) / NEARER
+            self.apart = apart
         moved = [float(np.linalg.norm(self._pose(f).translation - at)) for f, at in self.anchors.items()]
         shares["slip"] = max(moved, default=0.0) / CLOSED
         for pair, closed in self.loops.items():

@@ -64,3 +64,25 @@ def test_the_watch_is_content_with_a_robot_that_stands(
     watch = Watch(robot, phase, state.q, 0.01, {})
     for _ in range(3):
         assert watch.see(loop.step()) == []
+
+
+def test_the_watch_sees_a_joint_that_starts_too_fast(
+    standing: tuple[wb.Robot, wb.Phase, wb.State],
+) -> None:
+    robot, phase, state = standing
+    q = np.array(state.q)
+    q[8] += 1e-3
+    bounds = np.full(robot.model.nv - 6, 9.0)
+    watch = Watch(robot, phase, state.q, 0.01, {}, None, bounds)
+    assert any("acceleration" in what for what in watch.see(_tick(state, q, 0.01)))
+    slower = Watch(robot, phase, state.q, 0.01, {}, None, 2.0 * bounds)
+    assert not any("acceleration" in what for what in slower.see(_tick(state, q, 0.01)))
+
+
+def test_the_watch_sees_links_that_come_too_near(standing: tuple[wb.Robot, wb.Phase, wb.State]) -> None:
+    robot, _, state = standing
+    phase = wb.Phase("apart", limits=[wb.SelfCollision(distance=0.2, influence=0.3)])
+    q = np.array(state.q)
+    q[robot.joint_index(robot.joint_names[0])[0]] += 0.3  # one leg turned to the next
+    watch = Watch(robot, phase, state.q, 0.01, {})
+    assert any("clearance" in what for what in watch.see(_tick(state, q, 0.01)))

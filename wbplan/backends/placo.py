@@ -19,13 +19,13 @@ from typing import Any, final
 import numpy as np
 import pinocchio as pin
 import placo
-from lxml import etree
 from numpy.typing import NDArray
 
 from wbplan.aims import ComTarget
 from wbplan.backends.apart import keep_apart
 from wbplan.backends.placo_ascent import PlacoAscent
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
+from wbplan.backends.wrappers import WRAPPERS
+from wbplan.compiled import WORLD, FrameTarget
 from wbplan.diagnose import solve_error
 from wbplan.errors import SpecError
 from wbplan.joint_box import UNBOUNDED
@@ -50,8 +50,7 @@ class PlacoBackend:
     def __init__(self, stack: Stack) -> None:
         self._stack = stack
         phase = stack.phase
-        flags = int(placo.Flags.ignore_collisions)
-        self._robot = placo.RobotWrapper("", flags, _urdf_with_carried(phase))
+        self._robot = WRAPPERS.lend(self, phase)
         names = list(self._robot.model.names)[2:]
         if names != list(phase.robot.joint_names):
             raise SpecError(f"backend 'placo': reads other joints from the URDF than Pinocchio: {names}")
@@ -316,28 +315,6 @@ def _dependent(stack: Stack) -> set[str]:
     names = stack.hard_names()
     found = {names[k][0] for k in np.flatnonzero(share > 1e-3)}
     return {label for label in found if not label.startswith("contact(")} or found
-
-
-def _urdf_with_carried(phase: CompiledPhase) -> str:
-    """The URDF without its looks, and with each carried body as a link fixed to its holder."""
-    root = etree.fromstring(phase.robot.urdf_text.encode(), etree.XMLParser(resolve_entities=False))
-    for element in list(root.iter("visual", "collision")):
-        element.getparent().remove(element)
-    for held in phase.held:
-        xyz = " ".join(repr(float(x)) for x in held.T_holder_body.translation)
-        rpy = " ".join(repr(float(x)) for x in pin.rpy.matrixToRpy(held.T_holder_body.rotation))
-        com = " ".join(repr(x) for x in held.body.com)
-        name = held.body.name
-        link = etree.SubElement(root, "link", name=name)
-        inertial = etree.SubElement(link, "inertial")
-        etree.SubElement(inertial, "origin", xyz=com, rpy="0 0 0")
-        etree.SubElement(inertial, "mass", value=repr(float(held.body.mass)))
-        etree.SubElement(inertial, "inertia", ixx="1e-3", iyy="1e-3", izz="1e-3", ixy="0", ixz="0", iyz="0")
-        joint = etree.SubElement(root, "joint", name=f"{name}_held", type="fixed")
-        etree.SubElement(joint, "parent", link=held.holder)
-        etree.SubElement(joint, "child", link=name)
-        etree.SubElement(joint, "origin", xyz=xyz, rpy=rpy)
-    return str(etree.tostring(root, encoding="unicode"))
 
 
 def _one_line(error: Exception) -> str:
