@@ -143,11 +143,23 @@ def braking_bounds(robot: Robot, phase: Phase, bounds: Array) -> Array:
         (bounds[j] for j in _joints_to(model, [c.frame for c in phase.contacts]) if not slides[j]),
         default=np.inf,
     )
-    led = [task for task in phase.hard if isinstance(task, FrameTask) and not task.path.constant]
-    for j in _joints_to(model, [f for task in led for f in (task.frame, task.root) if f is not None]):
-        if not slides[j]:
-            braking[j] = min(braking[j], LED * least)
+    turning = led_joints(robot, phase) & ~np.array(slides)
+    braking[turning] = np.minimum(braking[turning], LED * least)
     return braking
+
+
+def stopping_bounds(robot: Robot, phase: Phase, bounds: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """`braking_bounds` and `led_joints`."""
+    return braking_bounds(robot, phase, bounds), led_joints(robot, phase)
+
+
+def led_joints(robot: Robot, phase: Phase) -> NDArray[np.bool_]:
+    """(n,) whether a joint is on the way to a frame that a hard task leads along a path."""
+    led = np.zeros(robot.model.nv - 6, dtype=np.bool_)
+    tasks = [task for task in phase.hard if isinstance(task, FrameTask) and not task.path.constant]
+    frames = [f for task in tasks for f in (task.frame, task.root) if f is not None]
+    led[list(_joints_to(robot.model, frames))] = True
+    return led
 
 
 def _joints_to(model: Any, frames: Iterable[str]) -> set[int]:

@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.acceleration import acceleration_bounds, braking_bounds, jerk_bounds
+from wbplan.acceleration import acceleration_bounds, jerk_bounds, stopping_bounds
 from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.errors import SpecError
@@ -99,7 +99,7 @@ class CompiledPhase:
             in one plane and nothing pushes.
         ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
-        acceleration, braking, jerk: (n,) bounds of all joints, see `wbplan.acceleration`; no jerk is None.
+        acceleration, braking, led, jerk: (n,) of all joints, see `wbplan.acceleration`; no jerk is None.
         standing: bodies that stand in the world and are not carried, each with its pose.
     """
 
@@ -120,6 +120,7 @@ class CompiledPhase:
     roles: Mapping[str, str | None]
     acceleration: Array
     braking: Array
+    led: NDArray[np.bool_]
     jerk: Array | None
     ascents: tuple[AscentTarget, ...] = ()
     standing: tuple[tuple[Body, Any], ...] = ()
@@ -203,7 +204,7 @@ def compile_phase(
         points,
         held,
         {**now, **phase.roles},
-        *(acceleration, braking_bounds(robot, phase, acceleration), jerk_bounds(robot, phase)),
+        *(acceleration, *stopping_bounds(robot, phase, acceleration), jerk_bounds(robot, phase)),
         tuple(ascent_target(t, phase, model) for t in phase.soft_tasks if isinstance(t, ManipulabilityTask)),
         standing(phase.carried, placed or {}, bodies),
     )
@@ -299,9 +300,8 @@ def _check_given(robot: Robot, phase: Phase, paths: Mapping[str, Path]) -> None:
         factor, joint, says = max(too_fast)
         own = joint in phase.driven and not phase.driven[joint].constant
         seconds = np.ceil(100.0 * factor * phase.duration) / 100.0
-        way = (
-            f"make its path {factor:.3g} times as long" if own else f"give the phase {seconds:.2f} s or more"
-        )
+        longer = f"make its path {factor:.3g} times as long"
+        way = longer if own else f"give the phase {seconds:.2f} s or more"
         raise SpecError(f"{says}; {way}")
 
 

@@ -21,6 +21,9 @@ for that slower motion only keeps to it, as long as each joint by itself can sti
 the longest step for which x, x - B, x - 2B, ... add up to d at most. So the box is never empty, and what it
 allows never leaves the limits. A state outside of them comes back along the same curve.
 
+Joints of a limb that a hard task leads along a path do not count in M: they brake by themselves, or the tick
+has no step and cares less (`Stack.ease`).
+
 With a bound j on a joint's jerk too, after steps p and o before it, braking is two first-order lags: x goes
 towards s, and s towards rest, by a share m a tick. What lags behind a quantity stays within any bounds that
 both are in, so with J = j dt^3
@@ -81,6 +84,7 @@ def stopping(
     q_upper: Any,
     slowing: Any,
     previous: Any,
+    led: Any,
     distances: Any,
     closing: Any,
     left: float,
@@ -88,20 +92,21 @@ def stopping(
     """M, and the factor 1 - min(1, 2 / M_p) of the steps when all slow down at once; see the module.
 
     Shapes:
-        q_lower, q_upper: (n,) position limits; slowing: (n,) B; previous: (n,) the step p.
+        q_lower, q_upper: (n,) position limits; slowing: (n,) B; previous: (n,) the step p; led: as in `box`.
         distances: (E,) of the CoM to the edges that it keeps inside [m]; closing: (E,) by how much the last
             step shortened them. left: ticks before rest.
     """
     ticks = 0.0
     for i in range(slowing.shape[0]):
-        ticks = max(ticks, abs(previous[i]) / slowing[i])
+        if not led[i]:
+            ticks = max(ticks, abs(previous[i]) / slowing[i])
     factor = max(0.0, 1.0 - 2.0 / max(ticks, 2.0))
     most = min(ticks + 1.0 / BRAKING, left)
     if factor > 0.0:
         for i in range(slowing.shape[0]):
             p, here = previous[i], q[q_index[i]]
             gap = q_upper[i] - here if p > 0.0 else here - q_lower[i]
-            if gap >= 0.0 and factor * abs(p) * (most + 1.0) > 2.0 * gap:
+            if gap >= 0.0 and not led[i] and factor * abs(p) * (most + 1.0) > 2.0 * gap:
                 most = 2.0 * gap / (factor * abs(p)) - 1.0
         for e in range(distances.shape[0]):
             if distances[e] >= 0.0 and factor * closing[e] * (most + 1.0) > 2.0 * distances[e]:
@@ -119,6 +124,7 @@ def box(
     most: Any,
     slowing: Any,
     previous: Any,
+    led: Any,
     left: float,
     ticks: float,
     factor: float,
@@ -130,7 +136,8 @@ def box(
 
     Shapes:
         q_lower, q_upper: (n,) position limits; reach: (n,) V; most: (n,) A; slowing: (n,) B.
-        previous: (n,) the step p; left: ticks before rest; ticks, factor: of `stopping`.
+        previous: (n,) the step p; led: (n,) whether a hard task's path leads the joint, which then stops by
+            itself or not at all; left: ticks before rest; ticks, factor: of `stopping`.
         ease: 0, all joints can stop together; 1, each by itself; 2, by itself with nearly all of A.
     """
     for i in range(q_index.shape[0]):
@@ -143,7 +150,7 @@ def box(
                 bound = alone = min(v, _alone(gap, 2.0 * BRAKING * a, left))
                 if ease <= 1:
                     bound = min(alone, _alone(gap, slowing[i], left))
-                if ease <= 0:
+                if ease <= 0 and not led[i]:
                     together = min(bound, slowing[i] * ticks, 2.0 * gap / (ticks + 1.0))
                     bound = max(together, min(alone, side * p * factor))
             if side > 0.0:
@@ -241,6 +248,7 @@ class JointBox:
         self.com_step = np.zeros(3)
         self.ticks, self.factor = 1.0, 0.0
         self.reach, self.most, self.slowing, self._jerk = np.full((4, n), UNBOUNDED)
+        self._led = phase.led[joints - 6]
         self._limited, self._jerky = limits is not None, False
         if limits is None:
             return
@@ -275,10 +283,10 @@ class JointBox:
             return
         limits = (q, self.q_index, self._q_lower, self._q_upper)
         p, left = self.previous, self.left
-        self.ticks, self.factor = stopping(*limits, self.slowing, p, distances, closing, left)
+        self.ticks, self.factor = stopping(*limits, self.slowing, p, self._led, distances, closing, left)
         box(
-            *limits, self.reach, self.most, self.slowing, p, left, self.ticks, self.factor, ease, self.lower,
-            self.upper,
+            *limits, self.reach, self.most, self.slowing, p, self._led, left, self.ticks, self.factor, ease,
+            self.lower, self.upper,
         )  # fmt: skip
         if self._jerky:
             jerk_box(

@@ -26,8 +26,12 @@ Array = NDArray[np.float64]
 PACE = 0.7
 #: Acceleration of a swinging foot [m/s^2] that an automatic step time allows.
 GENTLE = 2.5
+#: Acceleration of the centre of mass over the feet [m/s^2] that an automatic step time allows.
+CALM = 1.0
 #: Step times are whole numbers of these [s], so that phases end on ticks.
 GRAIN = 0.04
+#: Time [s] between the places by which the body's acceleration is found.
+INSTANT = 0.02
 #: Strides of the walks by which a shorter stride is looked for.
 TRIED = 2.5
 
@@ -119,14 +123,17 @@ def gait_for(walker: Walker, name: str, stance: Stance, heading: float, stroke: 
 
 
 def _step_time(done: Walk, manner: Manner) -> float:
-    """As short as the joints' speed allows and feet go gently, from a walk with steps of 1 s."""
+    """As short as the joints' speed allows and feet and body go gently, from a walk with steps of 1 s."""
     longest = max(
         (float(np.linalg.norm(np.diff(ends, axis=0))) for s in done.steps for ends in s.swing.values()),
         default=0.0,
     )
     # Largest accelerations of the quintic swing: 5.78 way / time^2, its time shorter by both ends' shares.
     gentle = math.sqrt(5.78 * max(longest / 0.64, 4.0 * manner.height) / GENTLE)
-    least = max(done.fastest.share / (PACE * manner.speed), gentle)
+    times = np.arange(0.0, done.schedule.course.duration, INSTANT, dtype=np.float64).reshape(-1)
+    body = np.diff(done.com.at(np.asarray(times)), 2, axis=0) / INSTANT**2
+    calm = math.sqrt(float(np.linalg.norm(body, axis=1).max(initial=0.0)) / CALM)
+    least = max(done.fastest.share / (PACE * manner.speed), gentle, calm)
     return GRAIN * math.ceil(least / GRAIN)
 
 
