@@ -108,7 +108,7 @@ def asked_of_proxqp(stack: Stack) -> proxsuite.proxqp.Results:
 def test_the_linear_solve_finds_the_solvers_step_and_multipliers(
     legarm: wb.Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found_active, hits = 0, []
+    found_active, hits, sets = 0, [], set()
     solve = ActiveSetGuess.solve
 
     def compared(self: ActiveSetGuess) -> tuple[np.ndarray, Multipliers] | None:
@@ -123,6 +123,7 @@ def test_the_linear_solve_finds_the_solvers_step_and_multipliers(
             np.testing.assert_allclose(multipliers.rows, results.z[:rows], atol=1e-5 * scale)
             np.testing.assert_allclose(multipliers.box, results.z[rows:], atol=1e-5 * scale)
             found_active += int((np.abs(multipliers.box) > 1e-6).any())
+            sets.add(tuple(np.flatnonzero(np.abs(multipliers.box) > 1e-6)))
         return found
 
     monkeypatch.setattr(ActiveSetGuess, "solve", compared)
@@ -131,4 +132,4 @@ def test_the_linear_solve_finds_the_solvers_step_and_multipliers(
         loop.step()
     assert found_active > 10, "hardly a limit was ever active: the test shows nothing"
     assert np.mean(hits) > 0.7  # joints that run into limits and out again, within their acceleration
-    assert not all(hits), "the solver was never needed: the test shows nothing"
+    assert len(sets) > 3, "the active bounds hardly changed: the test shows nothing"
