@@ -23,6 +23,7 @@ joint's axis to the foot. A joint that slides moves masses: its d and r are 1, i
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,12 @@ def limb_inertia(model: Any) -> Array:
         for j, length in _chain(model, link, float(np.linalg.norm(body.lever))):
             inertia[j] += body.mass if slides[j] else body.mass * length**2 + spin
     return inertia
+
+
+@lru_cache(maxsize=4)
+def _own_limbs(robot: Robot) -> Array:
+    """`limb_inertia` of a robot that carries nothing: the same in every phase of a plan."""
+    return limb_inertia(robot.model)
 
 
 def standing_inertia(model: Any, q: Array, feet: Sequence[str]) -> Array:
@@ -110,7 +117,8 @@ def acceleration_bounds(robot: Robot, phase: Phase, q: Array, model: Any = None)
     effort, speed = np.array(model.effortLimit[6:]), np.array(model.velocityLimit[6:])
     for contact in phase.contacts:
         frame_number(model, contact.frame, f"phase '{phase.name}'.contacts")
-    inertia = limb_inertia(model) + standing_inertia(model, q, [c.frame for c in phase.contacts])
+    limbs = _own_limbs(robot) if model is robot.model else limb_inertia(model)
+    inertia = limbs + standing_inertia(model, q, [c.frame for c in phase.contacts])
     bound: Array = speed / RISE
     named = (effort > 0.0) & (inertia > 0.0)
     bound[named] = np.minimum(bound[named], SHARE * effort[named] / inertia[named])

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, final
 from xml.etree import ElementTree
 
@@ -85,8 +86,9 @@ class CollisionModel:
         return f"{self.things[self.first[pair]].name} - {self.things[self.second[pair]].name}"
 
 
-def robot_shapes(robot: Robot, model: Any) -> Any:
-    """The robot's collision shapes as a `pinocchio.GeometryModel`, meshes as their hulls."""
+@lru_cache(maxsize=4)
+def _shapes_in_urdf(robot: Robot) -> Any:
+    """A robot's collision shapes: read once, as a plan asks for them in every phase."""
     root = ElementTree.fromstring(robot.urdf_text)
     for link in root.findall("link"):
         for visual in link.findall("visual"):
@@ -94,7 +96,7 @@ def robot_shapes(robot: Robot, model: Any) -> Any:
         for mesh in link.iterfind("collision/geometry/mesh"):
             mesh.set("filename", str(robot.mesh_path(mesh.get("filename", ""))))
     text = ElementTree.tostring(root, encoding="unicode")
-    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    geometry = pin.buildGeomFromUrdfString(robot.model, text, pin.GeometryType.COLLISION)
     if not geometry.ngeoms:
         raise SpecError(f"robot '{robot.name}': no link has a collision shape; no clearance can be kept")
     for item in geometry.geometryObjects:
@@ -103,6 +105,14 @@ def robot_shapes(robot: Robot, model: Any) -> Any:
                 raise SpecError(f"robot '{robot.name}': shape '{item.name}' has no volume")
             item.geometry = item.geometry.convex
     return geometry
+
+
+def robot_shapes(robot: Robot) -> Any:
+    """The robot's collision shapes as a `pinocchio.GeometryModel` of the caller's own, meshes as their hulls.
+
+    Frames keep their numbers in a model with carried bodies, which come after them.
+    """
+    return pin.GeometryModel(_shapes_in_urdf(robot))
 
 
 def collision_model(compiled: CompiledPhase) -> CollisionModel:
@@ -120,7 +130,7 @@ class _Builder:
 
     def __init__(self, compiled: CompiledPhase) -> None:
         self.compiled, self.model, self.robot = compiled, compiled.model, compiled.robot
-        self.geometry = robot_shapes(self.robot, self.model)
+        self.geometry = robot_shapes(self.robot)
         frames = self.model.frames
         self.things = [
             Thing(frames[g.parentFrame].name, g.parentJoint, True) for g in self.geometry.geometryObjects
