@@ -30,8 +30,8 @@ INFEASIBLE = 1e-20
 #: Costs and gradients above this are scaled down to it where the solver found no step.
 LARGE = 1e3
 
-#: Drift of a hard row [m or rad] in one tick that is left to the next one, where there is no step without.
-SLIGHT = 2e-6
+#: Drift of a hard row [m or rad] in one tick that is left to the next one, where there is no step without it.
+SLIGHT = 1e-6
 
 
 @final
@@ -79,26 +79,24 @@ class ProxqpBackend:
         return Solution(step, multipliers, levels)
 
     def _ask_solver(self) -> tuple[Array, Multipliers]:
-        return self._ask_exact() or self._ask_proxqp()
-
-    def _ask_exact(self) -> tuple[Array, Multipliers] | None:
-        """With ever less care for stopping; at last feet may drift by what a later tick puts back."""
-        while (found := self._exact.solve()) is None:
-            if not self._stack.ease():
-                return self._exact.solve(SLIGHT)
+        """daqp, with ever less care for stopping; then ProxQP; at last feet may drift a little."""
+        s, found = self._stack, self._exact.solve()
+        while found is None and s.ease():
+            found = self._exact.solve()
+        found = found or self._ask_proxqp() or self._exact.solve(SLIGHT)
+        if found is None:
+            raise solve_error(s, "the QP has no solution")
         self._guess.learn(found[1])
+        # With its active bounds known, one linear solve is sharper than a solver's tolerance.
         return self._guess.solve() or found
 
-    def _ask_proxqp(self) -> tuple[Array, Multipliers]:
+    def _ask_proxqp(self) -> tuple[Array, Multipliers] | None:
         s = self._stack
-        if not (self._run() or self._retry() or self._eased() or (s.relax() and self._retry())):
-            raise solve_error(s, "the QP has no solution")
+        if not (self._run() or self._retry() or (s.relax() and self._retry())):
+            return None
         results, rows = self._qp.results, len(s.d)
         y, z = self._scale * np.array(results.y), self._scale * np.array(results.z)
-        found = Multipliers(y, z[:rows], z[rows:])
-        self._guess.learn(found)
-        # With its active bounds known, one linear solve is sharper than the solver's tolerance.
-        return self._guess.solve() or (np.array(results.x), found)
+        return np.array(results.x), Multipliers(y, z[:rows], z[rows:])
 
     def _run(self) -> bool:
         s = self._stack
@@ -116,13 +114,6 @@ class ProxqpBackend:
         self._qp.solve()
         # The solver's residuals are absolute, in the rows' units, and below `eps_abs`.
         return bool(self._qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED)
-
-    def _eased(self) -> bool:
-        """With less care for stopping, where hard tasks lead on."""
-        while self._stack.ease():
-            if self._retry():
-                return True
-        return False
 
     def _retry(self) -> bool:
         """Once more from nothing, with patience, and slow to call it infeasible.
