@@ -30,6 +30,7 @@ def script(
     rate: float = 0.03,
     posture: float = 0.14,
     margin: float = 0.05,
+    clearance: float = 0.005,
     friction: float = 0.7,
 ) -> wb.Script:
     """Move the tip sideways with the two objectives, then hold it.
@@ -46,6 +47,8 @@ def script(
         posture: weight that draws the legs' joints to where they were [1/rad]; legs that end up far from it
             push against each other.
         margin: stability margin kept [m].
+        clearance: kept between links, and from the ground [m]; 0 keeps none, as the paper does, and then the
+            legs' lean brings the ends of their shanks into the ground.
         friction: of the feet on the ground [-].
     """
     tip = robot.state(start).pose("arm_tip")
@@ -56,17 +59,16 @@ def script(
         soft.append(wb.ManipulabilityTask("arm_tip", weight=manipulability, rate=rate))
     if balance > 0.0:
         soft.append(wb.BalanceTask(balance, settle=seconds / 4.0))
+    ground = [wb.Obstacle("ground", wb.Ground())]
+    clear: list[wb.SelfCollision | wb.Obstacles] = []
+    if clearance > 0.0:
+        clear = [wb.SelfCollision(clearance), wb.Obstacles(ground, clearance)]
     move = wb.Phase(
         "move sideways",
         contacts=[wb.Contact(foot, friction=friction) for foot in robot.feet.values()],
         hard=[wb.PoseTask("arm_tip", wb.MinJerk(tip, goal, seconds))],
         soft=soft,
-        limits=[
-            wb.JointLimits(),
-            wb.SupportPolygon(margin=margin),
-            wb.SelfCollision(),
-            wb.Obstacles([wb.Obstacle("ground", wb.Ground())]),
-        ],
+        limits=[wb.JointLimits(), wb.SupportPolygon(margin=margin), *clear],
         duration=seconds + hold,
     )
     return wb.Script(move, start=start)
