@@ -38,7 +38,7 @@ def test_every_promise_holds(crossing: wb.Plan) -> None:
 def test_body_stays_level_at_its_height(crossing: wb.Plan) -> None:
     q = crossing.trajectory.q
     assert q[:, 2] == pytest.approx(np.full(len(q), 0.6), abs=1e-2)  # it gives way to soles at an angle
-    assert np.abs(q[:, 3:5]).max() < 2e-3
+    assert np.abs(q[:, 3:5]).max() < 5e-3
 
 
 def test_legs_4_and_6_tread_on_the_blocks_and_no_foot_goes_through(crossing: wb.Plan) -> None:
