@@ -25,6 +25,7 @@ from wbplan.bodies import Body
 from wbplan.compiled import WORLD, CompiledPhase, compile_phase
 from wbplan.diagnose import solve_error
 from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.given import check_given
 from wbplan.paths import number, vector
 from wbplan.qp import Solution
 from wbplan.replay import Replay
@@ -185,6 +186,7 @@ class Loop:
         self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
         joints = self.compiled.free[6:]
         self.stack.begin(self.velocity * self.dt)
+        check_given(self.compiled, self.velocity, self.dt)
         if braking is not None:
             self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
 

@@ -29,6 +29,7 @@ LAYERS = [
     "statics",
     "aims",
     "compiled",
+    "given",
     "kinematics",
     "collision",
     "kernels",

@@ -95,17 +95,22 @@ def _speeds(replay: Replay) -> list[Row]:
 
 
 def _accelerations(replay: Replay) -> list[Row]:
-    """The change of velocity from one step to the next, over the step's duration."""
+    """The change of velocity from one step to the next, over its duration; at both ends, from and to rest."""
     if "joint_acceleration" not in replay.plan:
         return []
     limit = np.array(replay.plan["joint_acceleration"], dtype=np.float64)
-    duration = np.diff(replay.record.time)[1:, None]
-    excess = np.abs(np.diff(replay.step[:, 6:], axis=0)) / duration - limit
+    time, names = replay.record.time, replay.record.joint_names
+    duration = np.diff(time)[:, None]
+    excess = np.abs(np.diff(replay.step[:, 6:], axis=0)) / duration[1:] - limit
     worst = Worst("joint beyond acceleration limit", "rad/s2", slack=1e-6)
-    names = replay.record.joint_names
     units = _units(replay.model, names, "/s2")
-    worst.see(excess, 0.0, replay.record.time[1:-1], replay.phase_names[1:], names, units)
-    return worst.rows()
+    worst.see(excess, 0.0, time[1:-1], replay.phase_names[1:], names, units)
+    ends = np.array([0, -1])
+    moving = np.abs(replay.step[ends, 6:]) / duration[ends] - limit
+    rest = Worst("joint not at rest at an end", "rad/s2", slack=1e-6)
+    phases = [replay.phase_names[0], replay.phase_names[len(duration) - 1]]
+    rest.see(moving, 0.0, time[[0, -2]], phases, names, units)
+    return [*worst.rows(), *rest.rows()]
 
 
 def _continuity(replay: Replay) -> list[Row]:
