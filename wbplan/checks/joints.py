@@ -105,11 +105,13 @@ def _accelerations(replay: Replay) -> list[Row]:
     worst = Worst("joint beyond acceleration limit", "rad/s2", slack=1e-6)
     units = _units(replay.model, names, "/s2")
     worst.see(excess, 0.0, time[1:-1], replay.phase_names[1:], names, units)
-    ends = np.array([0, -1])
+    # A plan that was cut short says so, and ends as it moved.
+    whole = not replay.plan.get("report", {}).get("incomplete")
+    ends = np.array([0, -1] if whole else [0])
     moving = np.abs(replay.step[ends, 6:]) / duration[ends] - limit
     rest = Worst("joint not at rest at an end", "rad/s2", slack=1e-6)
-    phases = [replay.phase_names[0], replay.phase_names[len(duration) - 1]]
-    rest.see(moving, 0.0, time[[0, -2]], phases, names, units)
+    phases = [replay.phase_names[0], replay.phase_names[len(duration) - 1]][: len(ends)]
+    rest.see(moving, 0.0, time[[0, -2]][: len(ends)], phases, names, units)
     return [*worst.rows(), *rest.rows()]
 
 
