@@ -88,6 +88,9 @@ class Tick:
         asked = loop.compiled.phase.clearance
         if asked is not None and self.clearance < asked - 1e-6:
             self.warning += f"{'; ' if self.warning else ''}clearance not yet reached: {self.clearance:.4f} m"
+        if loop.too_fast:
+            joints = ", ".join(loop.too_fast)
+            self.warning += f"{'; ' if self.warning else ''}speed not yet within its limit: {joints}"
         self.microseconds = 1e6 * (time.perf_counter() - started)
 
     @cached_property
@@ -144,6 +147,7 @@ class Loop:
     Attributes:
         velocity: (nv,) of the last step [m/s, rad/s].
         last: the last tick made; None before the first.
+        too_fast: joints that came into the phase faster than its limits let them go, and still slow down.
 
     Raises:
         SpecError: the phase does not fit the robot, or not how it moves when the phase begins.
@@ -186,9 +190,15 @@ class Loop:
         self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
         joints = self.compiled.free[6:]
         self.stack.begin(self.velocity * self.dt)
+        self.too_fast = self._faster_than_limits()
         check_given(self.compiled, self.velocity, self.dt)
         if braking is not None:
             self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
+
+    def _faster_than_limits(self) -> tuple[str, ...]:
+        box, names = self.stack.box, self.compiled.robot.joint_names
+        fast = np.flatnonzero(np.abs(box.previous) > box.reach * (1.0 + 1e-6))
+        return tuple(names[self.compiled.free[6 + k] - 6] for k in fast)
 
     @property
     def backend(self) -> str:
@@ -276,6 +286,8 @@ class Loop:
         held_back = HeldBack(stack, solution)
         self.velocity = taken / self.dt
         stack.box.took(taken[stack.free], stack.kinematics.com - com)
+        if self.too_fast:
+            self.too_fast = self._faster_than_limits()
         self.last = Tick(self, self.velocity, held_back, replay, started)
         return self.last
 
