@@ -19,6 +19,8 @@ from wbplan.errors import SpecError, listing
 from wbplan.qp import Multipliers, Solution
 from wbplan.sensitivity import Held, Slopes, slopes
 from wbplan.stack import Stack
+from wbplan.state import State
+from wbplan.statics import ease_of_pushes
 
 Array = NDArray[np.float64]
 
@@ -26,6 +28,7 @@ Array = NDArray[np.float64]
 UNITS = {
     "mm": 1e-3, "mm/s": 1e-3, "mm/s^2": 1e-3, "mm/s^3": 1e-3,
     "deg": np.pi / 180, "deg/s": np.pi / 180, "deg/s^2": np.pi / 180, "deg/s^3": np.pi / 180,
+    "N": 1.0,
 }  # fmt: skip
 
 #: How a joint's limit is measured, by kind: what is appended to the unit of its position.
@@ -51,9 +54,9 @@ class Reason:
 
     Attributes:
         name: 'leg3_joint2 upper', 'contact(leg4_foot)', 'support polygon edge a-b', another task's label.
-        kind: 'position', 'speed', 'acceleration' of a joint; 'margin' and other kinds of `RowBlock`;
+        kind: 'position', 'speed', 'acceleration' of a joint; 'margin' and other kinds of `RowBlock`; 'push';
             'contact', 'hard' or 'soft', of another task.
-        unit: what one unit of it is: 'mm', 'deg', 'deg/s'.
+        unit: what one unit of it is: 'mm', 'deg', 'deg/s', 'N'.
         gain_per_unit: by how much the task's error [m or rad] falls for each unit that it gives way.
     """
 
@@ -107,6 +110,8 @@ def _told(reason: Reason, unit: str) -> str:
         return f"{joint} is at its {limit} ({one} more {gives})"
     if reason.kind == "margin":
         return f"the CoM is at {reason.name} ({one} less margin {gives})"
+    if reason.kind == "push":
+        return f"{reason.name} takes the CoM's room ({one} less {gives})"
     if reason.kind == "soft":
         return f"{reason.name} wants otherwise ({one} of its target {gives})"
     if reason.kind in ("contact", "hard"):
@@ -208,8 +213,9 @@ def _reasons(stack: Stack, held: tuple[Held, ...], found: Slopes, label: str) ->
         if name and found.rows[k]:
             one = "mm" if unit == "m" else "deg"
             # The CoM slows down before an edge: a tick may take only this share of what is left.
-            share = 2.0 / (stack.box.ticks + 1.0) if kind == "margin" and stack.easing == 0 else 1.0
-            yield Reason(name, kind, one, -share * found.rows[k] * UNITS[one])
+            share = _share(stack) if kind == "margin" else 1.0
+            yield Reason(name, kind, one, -share * float(found.rows[k]) * UNITS[one])
+    yield from _pushes(stack, found)
     groups: dict[tuple[str, str, str], list[float]] = {}
     for (name, unit), slope in zip(stack.hard_names(), found.hard, strict=True):
         kind = "contact" if name.startswith("contact(") else "hard"
@@ -225,6 +231,22 @@ def _reasons(stack: Stack, held: tuple[Held, ...], found: Slopes, label: str) ->
     for (name, kind, one), values in groups.items():
         if name != label:
             yield Reason(name, kind, one, float(np.linalg.norm(values)) * UNITS[one])
+
+
+def _share(stack: Stack) -> float:
+    """Of what is left to an edge of the support polygon, what a tick may take."""
+    return 2.0 / (stack.box.ticks + 1.0) if stack.easing == 0 else 1.0
+
+
+def _pushes(stack: Stack, found: Slopes) -> Iterator[Reason]:
+    """Pushes that leave the CoM less room: the region's active edges move as a push becomes less."""
+    compiled, edges = stack.phase, found.rows[: len(stack.normals)]
+    if compiled.polygon is None or not compiled.phase.pushes or not edges.any():
+        return
+    state = State(compiled.model, stack.kinematics.q)
+    eased = ease_of_pushes(compiled.phase, compiled.model, state, compiled.contact_points, compiled.polygon)
+    for frame, moved in eased.items():
+        yield Reason(f"push({frame})", "push", "N", -_share(stack) * float(edges @ moved))
 
 
 def _bounds(stack: Stack, held: tuple[Held, ...], found: Slopes) -> Iterator[Reason]:

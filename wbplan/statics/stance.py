@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -64,3 +65,32 @@ def push_load(phase: Phase, model: Any, state: State) -> Array:
     weight = pin.computeTotalMass(model) * float(np.linalg.norm(model.gravity.linear))
     per_weight: Array = load / weight
     return per_weight
+
+
+def ease_of_pushes(
+    phase: Phase, model: Any, state: State, points: Array, polygon: HalfPlanes, *, by: float = 1.0
+) -> dict[str, Array]:
+    """How far [m] each edge (E,) of a phase's region gives way for every newton that a push is less.
+
+    Args:
+        phase: with pushes.
+        model: its robot, with what it carries.
+        state: where the frames that push are where they push.
+        points: (C, 3) of the contacts [m].
+        polygon: what `support` gave for them.
+        by: how much less [N] the push is made to find it.
+    """
+    eased = {}
+    for k, push in enumerate(phase.pushes):
+        force = np.array(push.force)
+        size = float(np.linalg.norm(force))
+        if size == 0.0:
+            continue
+        step = min(by, size)
+        less = replace(push, force=tuple(force * (1.0 - step / size)))
+        pushes = (*phase.pushes[:k], less, *phase.pushes[k + 1 :])
+        other, _ = support(replace(phase, pushes=pushes), model, state, points, wanted=True)
+        assert other is not None  # it is wanted
+        reach = (polygon.normals @ other.vertices.T).max(axis=1)
+        eased[push.frame] = (reach - polygon.offsets) / step
+    return eased
