@@ -19,27 +19,35 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.active import Active, HeldBack
 from wbplan.backends import make_backend
-from wbplan.bodies import Body
-from wbplan.compiled import WORLD, CompiledPhase, compile_phase
-from wbplan.diagnose import solve_error
+from wbplan.compiled.given import check_given
+from wbplan.compiled.phase import WORLD, CompiledPhase, compile_phase
 from wbplan.errors import SolveError, SpecError, WbplanError
-from wbplan.given import check_given
+from wbplan.explain.active import Active, HeldBack
+from wbplan.explain.replay import Replay
+from wbplan.explain.why import Why, keep_goals
 from wbplan.paths import number, vector
-from wbplan.qp import Solution
-from wbplan.replay import Replay
-from wbplan.retract import DRIFT, Retraction
+from wbplan.program.diagnose import solve_error
+from wbplan.program.qp import Solution
+from wbplan.program.retract import DRIFT, Retraction
+from wbplan.program.stack import Stack
 from wbplan.robot import Robot
-from wbplan.script import Phase
-from wbplan.stack import Stack
+from wbplan.spec.bodies import Body
+from wbplan.spec.script import Phase
 from wbplan.state import State
-from wbplan.why import Why, keep_goals
 
 Array = NDArray[np.float64]
 
 #: A hard row further off than this [m or rad] after all correction breaks its promise; the checks allow 1e-4.
 PROMISE = 5e-5
+
+#: Least length of a tick [s]; powers of shorter ones vanish.
+SHORTEST = 1e-6
+
+
+def tick_length(dt: object) -> float:
+    """The length of a tick [s], or a `SpecError`."""
+    return number(dt, "dt", f"a finite positive time in seconds, {SHORTEST:g} or more", least=SHORTEST)
 
 
 @final
@@ -168,7 +176,7 @@ class Loop:
         rest_at: float | None = None,
         braking: Array | None = None,
     ) -> None:
-        self.dt, self.t = number(dt, "dt", "a finite positive time in seconds", above=0.0), 0.0
+        self.dt, self.t = tick_length(dt), 0.0
         if isinstance(state, State) and list(state.model.names) != list(robot.model.names):
             raise SpecError(f"state: one of '{state.model.name}', expected one of '{robot.name}'")
         start = State(robot.model, state.q if isinstance(state, State) else state)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.backends.exact import ExactSolver
-from wbplan.diagnose import solve_error
-from wbplan.stack import Stack
+from wbplan.program.diagnose import solve_error
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.errors import SolveError
-from wbplan.joint_box import UNBOUNDED
-from wbplan.qp import Multipliers
-from wbplan.stack import Stack
+from wbplan.program.joint_box import UNBOUNDED
+from wbplan.program.qp import Multipliers
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 
