@@ -51,6 +51,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from wbplan.compiled.phase import CompiledPhase
+from wbplan.errors import SpecError
 
 Array = NDArray[np.float64]
 
@@ -263,6 +264,11 @@ class JointBox:
             self._share = np.minimum(
                 0.9, np.minimum(BRAKING * self._jerk / (2 * self.most), self.slowing / self.reach)
             )
+            if (slow := np.flatnonzero(self._share < 1e-9)).size:
+                name = phase.robot.joint_names[joints[slow[0]] - 6]
+                raise SpecError(
+                    f"phase '{phase.phase.name}': jerk of joint '{name}' is too small to come to rest"
+                )
             self._rest = _ways_to_rest(self._share, self.reach, self.slowing)
 
     def brake_as(self, acceleration: Array) -> None:
@@ -375,7 +381,7 @@ def _ways_to_rest(share: Array, reach: Array, last: Array) -> Array:
             growth = math.exp(min((t - 1) * rate, 300.0))
             return growth * x / (2 * m * t) >= v and growth * x / 2 >= v
 
-        # The growth of x alone gives the least; that of s falls, then rises: one search after its lowest point.
+        # Where x may be fast enough is known; the bound of s falls first, and is searched where it rises.
         low = max(2.0, math.ceil(1.0 + math.log(max(2.0 * v / x, 1.0)) / shrinks))
         if not fast_enough(low):
             low, high = max(low, 1.0 / shrinks), max(2.0 * low, 2.0 / shrinks)
