@@ -35,6 +35,7 @@ def script(
     height: float | None = None,
     radius: float | None = None,
     margin: float | None = None,
+    clearance: float = 0.005,
     friction: float = 0.7,
 ) -> wb.Script:
     """A walk.
@@ -56,6 +57,8 @@ def script(
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
         margin: stability margin kept throughout [m]; half of the largest where not given.
+        clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do robots
+            without collision shapes.
         friction: of the feet on the ground [-].
     """
     walker = wb.gaits.Walker(robot)
@@ -72,14 +75,13 @@ def script(
     else:
         bend = wb.gaits.straight if path == "straight" else wb.gaits.arc
         track = bend(length, turn=math.radians(turn), heading=course)
-    # Of other robots it is not known here where their soles are and which of their links lie close by design.
-    ground = wb.Obstacle("ground", wb.Ground(), friction=friction)
-    apart = (wb.SelfCollision(), wb.Obstacles([ground])) if robot.name == ROBOT else ()
+    ground = wb.Obstacle("ground", wb.Ground(), (0.0, 0.0, -walker.sole), friction=friction)
+    apart = (wb.SelfCollision(clearance), wb.Obstacles([ground], clearance))
     manner = wb.gaits.Manner(
         step_time=step_time,
         height=rise,
         margin=margin,
         friction=friction,
-        limits=apart,
+        limits=apart if clearance > 0.0 and walker.solid else (),
     )
     return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner).script
