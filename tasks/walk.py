@@ -11,7 +11,9 @@ symmetrical hexapod robot with leg-arm integration", 2022 (gaits on five legs).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
 
 import wbplan as wb
 
@@ -37,6 +39,8 @@ def script(
     margin: float | None = None,
     clearance: float = 0.005,
     friction: float = 0.7,
+    terrain: Literal["flat", "rolling"] = "flat",
+    relief: float | None = None,
 ) -> wb.Script:
     """A walk.
 
@@ -51,22 +55,24 @@ def script(
         heading: of travel, against the mode's direction [degrees].
         turn: of the body by the end of the path [degrees].
         stroke: how far a foot goes in the body's frame while it stands [m]; six tenths of what they can where
-            not given, and half the body's height at most.
+            not given, and half the body's height at most; half of that on rolling ground.
         step_time: of a step [s]; as short as joints' speeds allow where not given.
         lift: how high feet rise [m]; a tenth of the body's height where not given.
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
         margin: stability margin kept throughout [m]; half of the largest where not given.
-        clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do robots
-            without collision shapes.
+        clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do
+            robots without collision shapes.
         friction: of the feet on the ground [-].
+        terrain: 'rolling' is a height field of hills and hollows, a few feet apart.
+        relief: of their tops over the mean height [m]; a twentieth of the body's height where not given.
     """
     walker = wb.gaits.Walker(robot)
     way = wb.gaits.mode_named(mode)
     stance = walker.stance(lean=way.lean, radius=radius, height=height)
     rise = 0.1 * stance.height if lift is None else lift
     stance, easy = wb.gaits.comfortable(walker, stance, rise, adjust=height is None)
-    stroke = easy if stroke is None else stroke
+    stroke = (easy if terrain == "flat" else 0.5 * easy) if stroke is None else stroke
     course = way.heading + math.radians(heading)
     made = wb.gaits.gait_for(walker, gait, stance, course, stroke)
     length = cycles * made.stride(stroke) if distance is None else distance
@@ -75,13 +81,37 @@ def script(
     else:
         bend = wb.gaits.straight if path == "straight" else wb.gaits.arc
         track = bend(length, turn=math.radians(turn), heading=course)
-    ground = wb.Obstacle("ground", wb.Ground(), (0.0, 0.0, -walker.sole), friction=friction)
-    apart = (wb.SelfCollision(clearance), wb.Obstacles([ground], clearance))
+    shape = (
+        wb.Ground() if terrain == "flat" else _rolling(stance.radius, length, relief or 0.05 * stance.height)
+    )
+    ground = wb.Obstacle("ground", shape, (0.0, 0.0, -walker.sole), friction=friction)
+    obstacles = wb.Obstacles([ground], clearance)
+    apart: tuple[Any, ...] = (wb.SelfCollision(clearance), obstacles) if clearance > 0.0 else ()
+    if terrain != "flat" and not apart:
+        apart = (obstacles,)
     manner = wb.gaits.Manner(
         step_time=step_time,
         height=rise,
         margin=margin,
         friction=friction,
-        limits=apart if clearance > 0.0 and walker.solid else (),
+        limits=apart if walker.solid else (),
     )
-    return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner).script
+    heights = wb.gaits.over(obstacles.terrain, -walker.sole)
+    return wb.gaits.walk(
+        walker,
+        made,
+        track,
+        stroke,
+        stance=stance,
+        manner=manner,
+        ground=lambda x, y: heights(x, y) + walker.sole,
+    ).script
+
+
+def _rolling(radius: float, length: float, relief: float) -> wb.HeightField:
+    """Waves of 2.2 and 2.6 radii, wide enough for the whole walk; level with the floor at the start."""
+    side = 3.0 * radius + length
+    grid = np.linspace(-side, side, 2 * math.ceil(8.0 * side / radius) + 1)
+    x, y = np.meshgrid(grid, grid, indexing="ij")
+    waves = np.sin(2.0 * np.pi * x / (2.2 * radius)) * np.cos(2.0 * np.pi * y / (2.6 * radius))
+    return wb.HeightField(grid, grid, relief * waves)

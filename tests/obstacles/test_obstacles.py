@@ -209,3 +209,24 @@ def test_one_name_one_obstacle_in_a_script() -> None:
     assert [item.name for item in wb.Script(phase("a", 0.1), phase("b", 0.1)).obstacles] == ["ball"]
     with pytest.raises(wb.SpecError, match="two different obstacles are named 'ball'"):
         wb.Script(phase("a", 0.1), phase("b", 0.2))
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_how_far_a_point_is_above_what_is_under_it(kind: str) -> None:
+    item = placed(kind)
+    terrain = wb.Obstacles([item]).terrain
+    solid = kind in ("ground", "height_field")
+    x, y, _ = item.pose.act(CORNERS.mean(axis=0) if kind == "mesh" else np.zeros(3))
+    top = terrain.height(x, y)
+    points = np.array([[x, y, top + h] for h in (0.2, 0.0, -0.01, -5.0)])
+    expected = [0.2, 0.0, -0.01, -5.0 if solid else np.inf]
+    assert terrain.above(points) == pytest.approx(np.array(expected), abs=1e-9)
+    if kind != "ground":
+        assert terrain.above(np.array([[9.0, 9.0, 0.0]])) == [np.inf]
+
+
+def test_what_is_overhead_is_no_ground() -> None:
+    table = wb.Obstacle("table", wb.Box((1.0, 1.0, 0.05)), (0.0, 0.0, 0.7))
+    terrain = wb.Obstacles([wb.Obstacle("floor", wb.Ground()), table]).terrain
+    points = np.array([[0.0, 0.0, 0.3], [0.0, 0.0, 0.7], [0.0, 0.0, 0.8], [0.0, 0.0, -0.1]])
+    assert terrain.above(points) == pytest.approx([0.3, -0.025, 0.075, -0.1])

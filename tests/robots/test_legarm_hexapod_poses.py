@@ -124,8 +124,8 @@ def test_crossed_limbs_do_touch(legarm):
 
 
 def test_a_limb_changes_its_role_without_touching_itself(legarm):
-    # Joint 4 to 100 degrees and shank 2 together, then all the rest: inside the channel the arm cannot turn, and
-    # the foot passes only behind an arm that stands across.
+    # Joint 4 to 100 degrees and shank 2 together, then all the rest: inside the channel the arm cannot turn,
+    # and the foot passes only behind an arm that stands across.
     active = legarm.solids_with(set(legarm.disabled()), keep=False)
     leg, arm = legarm.states("all")["stand"], legarm.states("all")["manipulate"]
     for s in np.linspace(0.0, 1.0, 81):

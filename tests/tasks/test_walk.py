@@ -12,9 +12,9 @@ import pytest
 
 import wbplan as wb
 from wbplan import catalog
-from wbplan.cli import main
+from wbplan.cli.commands import main
+from wbplan.cli.survey import distinct
 from wbplan.gaits import Walker, gaits_of, quadrangular
-from wbplan.survey import distinct
 from wbplan.taskfile import load_task
 
 TASK = load_task("walk")

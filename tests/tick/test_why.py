@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbplan as wb
-from wbplan.why import UNITS
+from wbplan.explain.why import UNITS
 
 FEET = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")
 STACKS = {
@@ -183,6 +183,34 @@ def test_the_margin_is_a_reason_that_gives_what_it_says(legarm: wb.Robot) -> Non
     real = _predicted(loop(moving.q, 0.15), "com") - _predicted(loop(moving.q, 0.149), "com")
     assert real == pytest.approx(first.gain_per_unit, rel=1e-3)
     assert "the CoM is at support polygon edge leg3_foot-leg6_foot (1 mm less margin gives back" in str(why)
+
+
+def test_a_push_is_a_reason_that_gives_what_it_says_for_each_newton() -> None:
+    hiphant = wb.load_robot("hiphant")
+    start = hiphant.state("ready")
+    drag = wb.ComTask(start.com + np.array([-0.4, 0.05, 0.0]), weight=20.0)
+
+    def loop(q: Any, force: float) -> wb.Loop:
+        phase = wb.Phase(
+            "p",
+            contacts=[wb.Contact(foot) for foot in hiphant.feet.values()],
+            hard=[wb.PositionTask("arm_tip")],
+            soft=[drag],
+            pushes=[wb.Push("arm_tip", (force, 0.0, 0.0))],
+            limits=[wb.JointLimits(), wb.SupportPolygon(0.05)],
+        )
+        return wb.Loop(hiphant, phase, q, dt=0.02)
+
+    moving = loop(start, 60.0)
+    for _ in range(150):
+        moving.step()
+    why = loop(moving.q, 60.0).step().why("com")
+    reason = next(r for r in why.reasons if r.kind == "push")
+    assert (reason.name, reason.unit) == ("push(arm_tip)", "N")
+    for less, near in ((0.01, 1e-3), (1.0, 5e-2)):  # [N]; farther on, other limits come into play
+        real = why.error - loop(moving.q, 60.0 - less).step().why("com").error
+        assert real == pytest.approx(less * reason.gain_per_unit, rel=near)
+    assert "push(arm_tip) takes the CoM's room (1 N less gives back" in str(why)
 
 
 def test_a_speed_limit_is_a_reason_that_gives_what_it_says(legarm: wb.Robot) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from wbplan.checks.replay import Array, Replay, Window
 from wbplan.checks.report import Row, Tolerances, Worst
+from wbplan.obstacles import Terrain
 
 TOUCHDOWN = 0.02  #: [m/s], fastest mean speed of a foot over the last step before it is in contact
 SINK = 1e-3  #: [m], how far a foot that is not in contact may be below the ground
@@ -15,8 +14,14 @@ LEVEL = 1e-6  #: horizontal part of a unit normal that still counts as upright
 
 
 def rows(replay: Replay, bounds: Tolerances) -> list[Row]:
-    """Slip, level contacts, touch-downs at rest, swing feet above the ground."""
-    return [*_slip(replay, bounds), *_level(replay, bounds), *_touchdown(replay), *_friction(replay)]
+    """Slip, level contacts, swing feet above the ground, touch-downs at rest."""
+    return [
+        *_slip(replay, bounds),
+        *_level(replay, bounds),
+        *_swings(replay),
+        *_touchdown(replay),
+        *_friction(replay),
+    ]
 
 
 def _slip(replay: Replay, bounds: Tolerances) -> list[Row]:
@@ -37,46 +42,53 @@ def _slip(replay: Replay, bounds: Tolerances) -> list[Row]:
 
 
 def _level(replay: Replay, bounds: Tolerances) -> list[Row]:
-    """Contacts whose hull is used as support region lie in one plane, and level ground stays level.
+    """Contacts whose hull is used as support region lie in one plane.
 
-    Between two phases with a static-equilibrium region, which may change level, all upright contacts
-    share one height; contacts on a slope are compared with their own plane. The other feet, while they
-    swing, stay above that height.
+    Each phase by itself: upright contacts share one height, contacts on a slope are compared with their own
+    plane. From phase to phase the level is the same by the feet that stay, which do not slip; feet that
+    change places may stand on another one.
     """
-    level, swing = Worst("contacts level", "m"), Worst("swing feet above ground", "m", at_least=True)
-    for run in _runs_on_one_level(replay):
-        starts = [(w, f, replay.frames[f].position[w.samples[0], 2]) for w in run for f in w.feet]
-        ground = float(np.median([height for _, _, height in starts]))
-        feet = sorted({foot for _, foot, _ in starts})
-        for window, foot, height in starts:
-            at = replay.times(window.samples[:1])
-            level.see([abs(height - ground)], bounds.ground, at, window.name, [foot])
-        for window in run:
-            for foot in feet:
-                if foot not in window.feet:
-                    above = replay.frames[foot].position[window.samples, 2] - ground
-                    swing.see(above, -SINK, replay.times(window.samples), window.name, [foot])
+    level = Worst("contacts level", "m")
     for window in replay.windows:
-        if _uses_hull(window) and not _upright(window) and len(window.feet) > 3:
-            points = np.array([replay.frames[foot].position[window.samples[0]] for foot in window.feet])
+        if not (_uses_hull(window) and window.feet):
+            continue
+        points = np.array([replay.frames[foot].position[window.samples[0]] for foot in window.feet])
+        if _upright(window):
+            across = np.abs(points[:, 2] - np.median(points[:, 2]))
+        else:  # that three points always lie in a plane is no merit
             centered = points - points.mean(axis=0)
-            across = np.abs(centered @ np.linalg.svd(centered)[2][2])
-            level.see(across[None], bounds.ground, replay.times(window.samples[:1]), window.name, window.feet)
-    return [*level.rows(), *swing.rows()]
+            across = np.abs(centered @ np.linalg.svd(centered)[2][2]) if len(points) > 3 else np.zeros(0)
+        level.see(across[None], bounds.ground, replay.times(window.samples[:1]), window.name, window.feet)
+    return level.rows()
 
 
-def _runs_on_one_level(replay: Replay) -> Iterator[list[Window]]:
-    """Consecutive phases that stand on one level by what they promise."""
-    run: list[Window] = []
-    for window in replay.windows:
-        if "region" in window.promises or not _upright(window):
-            if run:
-                yield run
-            run = []
-        elif _uses_hull(window) and window.feet:
-            run.append(window)
-    if run:
-        yield run
+def _swings(replay: Replay) -> list[Row]:
+    """Feet in the air are not below the ground.
+
+    The ground is what the plan says to stand in the world; where that has nothing, and contacts are upright,
+    the lower one of the two places that a foot comes from and goes to.
+    """
+    swing = Worst("swing feet above ground", "m", at_least=True)
+    for k, window in enumerate(replay.windows):
+        standing = set(window.promises.get("obstacles", ()))
+        terrain = Terrain([item for item in replay.obstacles if item.name in standing])
+        known = _uses_hull(window) and _upright(window)
+        for foot in sorted({foot for other in replay.windows for foot in other.feet} - set(window.feet)):
+            places = replay.frames[foot].position[window.samples]
+            ends = [_stands_at(replay, foot, k, step) for step in (-1, 1)] if known else []
+            lower = min((z for z in ends if z is not None), default=-np.inf)
+            above = terrain.above(places)
+            above = np.where(np.isfinite(above), above, places[:, 2] - lower)
+            seen = np.isfinite(above)
+            swing.see(above[seen], -SINK, replay.times(window.samples[seen]), window.name, [foot])
+    return swing.rows()
+
+
+def _stands_at(replay: Replay, foot: str, k: int, step: int) -> float | None:
+    """Height [m] at which a foot stands in the nearest phase before (`step` -1) or after phase k."""
+    windows = replay.windows[k + 1 :] if step > 0 else replay.windows[:k][::-1]
+    held = next((window for window in windows if foot in window.feet), None)
+    return None if held is None else float(replay.frames[foot].position[held.samples[0], 2])
 
 
 def _touchdown(replay: Replay) -> list[Row]:

@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import NO_MARGIN, Bundle, Trajectory
+from wbplan.obstacles import Obstacle
 
 Array = NDArray[np.float64]
 
@@ -112,6 +113,7 @@ class Replay:
         frames: name -> poses over all samples, of every frame that a phase names.
         com: (N, 3) [m], world, of the robot alone.
         mass: [kg], of the robot alone.
+        obstacles: what stands in the world in any phase.
     """
 
     model: Any
@@ -122,6 +124,7 @@ class Replay:
     frames: Mapping[str, Poses]
     com: Array
     mass: float
+    obstacles: tuple[Obstacle, ...] = ()
 
     @staticmethod
     def of(bundle: Bundle) -> Replay:
@@ -148,7 +151,8 @@ class Replay:
                 step[k - 1] = pin.difference(model, q[k - 1], configuration)
         step /= np.diff(motion.time)[:, None]
         frames = {name: Poses(rotation[i], position[i]) for i, name in enumerate(names)}
-        return Replay(model, motion, bundle.plan, windows, step, frames, com, pin.computeTotalMass(model))
+        mass = pin.computeTotalMass(model)
+        return Replay(model, motion, bundle.plan, windows, step, frames, com, mass, bundle.obstacles)
 
     @property
     def phase_names(self) -> list[str]:

@@ -10,21 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, PchipInterpolator
 
-from wbplan.contacts import Contact
 from wbplan.errors import GaitError, SpecError
 from wbplan.gaits.balance import Stay, Sway, common_margins, largest_margin, sway
 from wbplan.gaits.gait import Gait
+from wbplan.gaits.ground import normal_at
 from wbplan.gaits.reach import Fastest, follow
 from wbplan.gaits.schedule import Ground, Schedule, Step, flat
 from wbplan.gaits.stance import Stance, Walker
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.geometry import support_polygon
-from wbplan.limits import JointLimits, SupportPolygon
 from wbplan.paths import number
 from wbplan.robot import Robot
-from wbplan.script import Phase, Script
+from wbplan.spec.contacts import Contact
+from wbplan.spec.limits import JointLimits, SupportPolygon
+from wbplan.spec.script import Phase, Script
+from wbplan.spec.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 from wbplan.state import State
-from wbplan.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 
 Array = NDArray[np.float64]
 Fields = Callable[[Step], Mapping[str, Any]]
@@ -229,7 +230,7 @@ def build(
             PoseTask(walker.root, places, weight=((0.0, 0.0, 100.0), 50.0)),
         ]
         phases.append(
-            _phase(walker, step, paths, tasks, margin, manner, dict(fields(step)) if fields else {})
+            _phase(walker, step, paths, tasks, margin, manner, ground, dict(fields(step)) if fields else {})
         )
     return Walk(walker.robot, start, made, steps, tuple(phases), com, margin, fastest)
 
@@ -241,6 +242,7 @@ def _phase(
     body: Sequence[Task],
     margin: float,
     manner: Manner,
+    ground: Ground,
     more: dict[str, Any],
 ) -> Phase:
     robot = walker.robot
@@ -251,7 +253,10 @@ def _phase(
     limits = (JointLimits(speed=manner.speed), SupportPolygon(margin=margin), *manner.limits)
     return Phase(
         step.name,
-        contacts=tuple(Contact(robot.feet[limb], friction=manner.friction) for limb in step.support),
+        contacts=tuple(
+            Contact(robot.feet[limb], friction=manner.friction, normal=normal_at(ground, foot))
+            for limb, foot in step.support.items()
+        ),
         hard=(*swings, *more.pop("hard", ())),
         soft=(*more.pop("soft", rest), *body),
         limits=tuple(more.pop("limits", limits)),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +23,13 @@ Place = Callable[[str, Array], Array]
 ROUND = 8
 #: Places looked at in each direction.
 RINGS = 12
+#: Distance [m] over which the slope of a ground is found that only tells heights.
+NEAR = 1e-3
 
 
-def over(terrain: Terrain, floor: float = 0.0) -> Ground:
+@final
+@dataclass(frozen=True, eq=False)
+class Over:
     """Height of a terrain, and of the floor where it has nothing.
 
     Args:
@@ -30,11 +37,41 @@ def over(terrain: Terrain, floor: float = 0.0) -> Ground:
         floor: [m].
     """
 
-    def height(x: float, y: float) -> float:
-        found = float(terrain.height(x, y))
-        return found if np.isfinite(found) else floor
+    terrain: Terrain
+    floor: float = 0.0
 
-    return height
+    def __call__(self, x: float, y: float) -> float:
+        """Height [m] at x, y [m]."""
+        found = float(self.terrain.height(x, y))
+        return found if np.isfinite(found) else self.floor
+
+    def normal(self, x: float, y: float) -> tuple[float, float, float]:
+        """Unit normal of the surface at x, y [m]."""
+        a, b, c = (float(value) for value in self.terrain.normal(x, y))
+        return a, b, c
+
+
+def over(terrain: Terrain, floor: float = 0.0) -> Over:
+    """The ground that a terrain is, with its slopes.
+
+    Args:
+        terrain: obstacles seen from above.
+        floor: its height where it has nothing [m].
+    """
+    return Over(terrain, floor)
+
+
+def normal_at(ground: Ground, foot: Array) -> tuple[float, float, float]:
+    """Unit normal of the ground at a foothold (3,) [m]; by differences where only heights are known."""
+    x, y = float(foot[0]), float(foot[1])
+    if isinstance(ground, Over):
+        return ground.normal(x, y)
+    along_x, along_y = (
+        (ground(x + dx, y + dy) - ground(x - dx, y - dy)) / (2.0 * NEAR)
+        for dx, dy in ((NEAR, 0.0), (0.0, NEAR))
+    )
+    length = math.sqrt(along_x**2 + along_y**2 + 1.0)
+    return -along_x / length, -along_y / length, 1.0 / length
 
 
 def firm(ground: Ground, radius: float, reach: float, rise: float = 0.005) -> Place:

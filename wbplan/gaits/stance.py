@@ -152,7 +152,7 @@ class Walker:
 
     @cached_property
     def sole(self) -> float:
-        """How far below the feet's frames the ground is [m]: see `collision.sole`; 0 of a robot without shapes."""
+        """How far below the feet's frames the ground is [m]; see `collision.sole`."""
         if not self.solid:
             return 0.0
         return max(sole(self.robot, self.robot.feet[leg]) for leg in self.legs)

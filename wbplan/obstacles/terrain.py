@@ -62,6 +62,20 @@ class Terrain:
         found: Array = np.take_along_axis(normals, best[None, ..., None], axis=0)[0]
         return np.where(np.isfinite(heights.max(axis=0))[..., None], found, up)
 
+    def above(self, points: Array) -> Array:
+        """How far points (P, 3) [m], world, are above what is under them; inf where there is nothing.
+
+        Negative in a solid: how far its surface is straight above. What is wholly over a point does not
+        count; ground and height fields are solid downward.
+        """
+        found = np.full(len(points), np.inf)
+        for item in self.obstacles:
+            top = _top(item, points[:, :2])[0]
+            over = _bottom(item, points[:, :2]) > points[:, 2]
+            gap = points[:, 2] - top  # inf beside it
+            found = np.minimum(found, np.where(over, np.inf, gap))
+        return found
+
     def under(self, x: float, y: float) -> Obstacle | None:
         """The obstacle whose surface is the highest over (x, y)."""
         heights = self._tops(x, y)[0]
@@ -92,6 +106,15 @@ def _top(item: Obstacle, points: Array) -> tuple[Array, Array]:
     up = R[2]
     s, normal = _exit(item.shape, origins, up)
     return s, normal @ R.T
+
+
+def _bottom(item: Obstacle, points: Array) -> Array:
+    """Height (P,) of an obstacle's underside over points (P, 2), world; -inf where it has none."""
+    if isinstance(item.shape, HeightField | Ground):
+        return np.full(len(points), -np.inf)
+    R, p = np.array(item.pose.rotation), np.array(item.pose.translation)
+    origins = (np.column_stack([points, np.zeros(len(points))]) - p) @ R
+    return -_exit(item.shape, origins, -R[2])[0]
 
 
 def _exit(shape: Box | Sphere | Cylinder | Mesh | Ground, origins: Array, up: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from wbplan.statics.region import (
     support_region,
 )
 from wbplan.statics.robust import WrenchCone, tilt
-from wbplan.statics.stance import push_load, support
+from wbplan.statics.stance import ease_of_pushes, push_load, support
 
 __all__ = [
     "ForceQP",
@@ -23,6 +23,7 @@ __all__ = [
     "TorqueLimits",
     "WrenchCone",
     "axes_of",
+    "ease_of_pushes",
     "equilibrium_region",
     "faces",
     "force_closure",

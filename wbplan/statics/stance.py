@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.bodies import frame_number
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
-from wbplan.script import Phase
+from wbplan.spec.bodies import frame_number
+from wbplan.spec.script import Phase
+from wbplan.spec.tasks import FrameTask
 from wbplan.state import State
 from wbplan.statics.region import hull_is_exact, support_region
-from wbplan.tasks import FrameTask
 
 Array = NDArray[np.float64]
 
@@ -64,3 +65,32 @@ def push_load(phase: Phase, model: Any, state: State) -> Array:
     weight = pin.computeTotalMass(model) * float(np.linalg.norm(model.gravity.linear))
     per_weight: Array = load / weight
     return per_weight
+
+
+def ease_of_pushes(
+    phase: Phase, model: Any, state: State, points: Array, polygon: HalfPlanes, *, by: float = 1.0
+) -> dict[str, Array]:
+    """How far [m] each edge (E,) of a phase's region gives way for every newton that a push is less.
+
+    Args:
+        phase: with pushes.
+        model: its robot, with what it carries.
+        state: where the frames that push are where they push.
+        points: (C, 3) of the contacts [m].
+        polygon: what `support` gave for them.
+        by: how much less [N] the push is made to find it.
+    """
+    eased = {}
+    for k, push in enumerate(phase.pushes):
+        force = np.array(push.force)
+        size = float(np.linalg.norm(force))
+        if size == 0.0:
+            continue
+        step = min(by, size)
+        less = replace(push, force=tuple(force * (1.0 - step / size)))
+        pushes = (*phase.pushes[:k], less, *phase.pushes[k + 1 :])
+        other, _ = support(replace(phase, pushes=pushes), model, state, points, wanted=True)
+        assert other is not None  # it is wanted
+        reach = (polygon.normals @ other.vertices.T).max(axis=1)
+        eased[push.frame] = (reach - polygon.offsets) / step
+    return eased
