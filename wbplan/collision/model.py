@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
 from wbplan.obstacles import Box, Cylinder, HeightField, Mesh, Obstacle, Sphere
+from wbplan.problem.limits import SelfCollision
 from wbplan.robot import Robot
-from wbplan.spec.limits import SelfCollision
 from wbplan.state import find_frame
 
 Array = NDArray[np.float64]
