@@ -11,7 +11,7 @@ symmetrical hexapod robot with leg-arm integration", 2022 (gaits on five legs).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,6 +37,7 @@ def script(
     height: float | None = None,
     radius: float | None = None,
     margin: float | None = None,
+    clearance: float = 0.005,
     friction: float = 0.7,
     terrain: Literal["flat", "rolling"] = "flat",
     relief: float | None = None,
@@ -60,6 +61,8 @@ def script(
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
         margin: stability margin kept throughout [m]; half of the largest where not given.
+        clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do
+            robots without collision shapes.
         friction: of the feet on the ground [-].
         terrain: 'rolling' is a height field of hills and hollows, a few feet apart.
         relief: of their tops over the mean height [m]; a twentieth of the body's height where not given.
@@ -81,9 +84,9 @@ def script(
     shape = (
         wb.Ground() if terrain == "flat" else _rolling(stance.radius, length, relief or 0.05 * stance.height)
     )
-    obstacles = wb.Obstacles([wb.Obstacle("ground", shape, friction=friction)])
-    # Of other robots it is not known here where their soles are and which of their links lie close by design.
-    apart = (wb.SelfCollision(), obstacles) if robot.name == ROBOT else ()
+    ground = wb.Obstacle("ground", shape, (0.0, 0.0, -walker.sole), friction=friction)
+    obstacles = wb.Obstacles([ground], clearance)
+    apart: tuple[Any, ...] = (wb.SelfCollision(clearance), obstacles) if clearance > 0.0 else ()
     if terrain != "flat" and not apart:
         apart = (obstacles,)
     manner = wb.gaits.Manner(
@@ -91,10 +94,18 @@ def script(
         height=rise,
         margin=margin,
         friction=friction,
-        limits=apart,
+        limits=apart if walker.solid else (),
     )
-    ground = wb.gaits.over(obstacles.terrain)
-    return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner, ground=ground).script
+    heights = wb.gaits.over(obstacles.terrain, -walker.sole)
+    return wb.gaits.walk(
+        walker,
+        made,
+        track,
+        stroke,
+        stance=stance,
+        manner=manner,
+        ground=lambda x, y: heights(x, y) + walker.sole,
+    ).script
 
 
 def _rolling(radius: float, length: float, relief: float) -> wb.HeightField:

@@ -22,10 +22,10 @@ from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.why import Why
 from wbplan.fallback import Retries
+from wbplan.problem.script import Phase, Script
 from wbplan.reasons import why_at
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
-from wbplan.spec.script import Phase, Script
 from wbplan.state import State
 from wbplan.tick import Loop, tick_length
 

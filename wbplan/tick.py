@@ -27,13 +27,13 @@ from wbplan.explain.active import Active, HeldBack
 from wbplan.explain.replay import Replay
 from wbplan.explain.why import Why, keep_goals
 from wbplan.paths import number, vector
+from wbplan.problem.bodies import Body
+from wbplan.problem.script import Phase
 from wbplan.program.diagnose import solve_error
 from wbplan.program.qp import Solution
 from wbplan.program.retract import DRIFT, Retraction
 from wbplan.program.stack import Stack
 from wbplan.robot import Robot
-from wbplan.spec.bodies import Body
-from wbplan.spec.script import Phase
 from wbplan.state import State
 
 Array = NDArray[np.float64]
