@@ -11,7 +11,6 @@ from pathlib import Path
 import wbplan as wb
 from wbplan import catalog
 
-
 #: So many robots are generated: PlaCo keeps the memory of every one that it was ever told of.
 MADE = 24
 
