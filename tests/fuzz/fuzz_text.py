@@ -163,24 +163,19 @@ def mutate_json(rng: random.Random, value: Any) -> bytes:
     return text
 
 
-def _places(value: Any) -> list[tuple[Any, Any]]:
-    """(container, key) of everything below a value, however deep it is."""
-    found: list[tuple[Any, Any]] = []
-    below = [value]
-    while below:
-        value = below.pop()
-        keys = (
-            list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
-        )
-        found += [(value, key) for key in keys]
-        below += [value[key] for key in reversed(keys)]
+def _places(value: Any, found: list[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
+    """(container, key) of everything below a value."""
+    keys = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    for key in keys:
+        found.append((value, key))
+        _places(value[key], found)
     return found
 
 
 def _change_json(rng: random.Random, value: Any) -> Any:
-    places = _places(value)
+    places = _places(value, [])
     if not places or chance(rng, 0.005):
-        return rng.choice(NASTY_JSON)
+        return copy.deepcopy(rng.choice(NASTY_JSON))
     # Long lists (a region's corners) must not take all the attention.
     container, key = rng.choice(places)
     inside, name = rng.choice(places)
@@ -198,8 +193,8 @@ def _change_json(rng: random.Random, value: Any) -> Any:
             )
     elif kind == 4 and isinstance(container, dict):
         container[rng.choice(["clearance", "region", "joint_acceleration", "normal", "com", "x", ""])] = (
-            rng.choice(NASTY_JSON)
+            copy.deepcopy(rng.choice(NASTY_JSON))
         )
     else:
-        container[key] = rng.choice(NASTY_JSON)
+        container[key] = copy.deepcopy(rng.choice(NASTY_JSON))
     return value
