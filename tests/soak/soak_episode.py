@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import time
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,7 @@ from soak_watch import Watch
 import wbplan as wb
 
 LONGEST = 400  #: ticks of one phase
+ENDLESS = 5.0  #: [s] of the processor's time, that a tick may take; the first ones compile
 REFUSALS = 3  #: in a row, then the phase is given up
 
 
@@ -27,14 +29,19 @@ class Outcome:
         counts: "ticks proxqp", "refused: ...", "warned" ... -> how often.
         worst: promise -> largest share of its bound that was used.
         found: what should not have happened.
+        slowest: longest time of a tick that was made or refused [s].
     """
 
     counts: Counter[str] = field(default_factory=Counter)
     worst: dict[str, float] = field(default_factory=dict)
     found: list[str] = field(default_factory=list)
+    slowest: float = 0.0
 
-    def add(self, counts: dict[str, int], worst: dict[str, float], found: list[str]) -> None:
+    def add(
+        self, counts: dict[str, int], worst: dict[str, float], found: list[str], slowest: float = 0.0
+    ) -> None:
         self.counts.update(counts)
+        self.slowest = max(self.slowest, slowest)
         for promise, share in worst.items():
             self.worst[promise] = max(share, self.worst.get(promise, -np.inf))
         self.found += found
@@ -50,7 +57,7 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
     out = Outcome()
     robot = any_robot(rng)
     state = start_of(rng, robot)
-    q, roles, velocity = np.array(state.q), None, None
+    q, roles, velocity, acceleration = np.array(state.q), None, None, None
     placed: dict[str, Any] = {}
     dt = rng.choice((0.001, 0.002, 0.005, 0.01, 0.02))
     for k in range(rng.randint(1, 4)):
@@ -60,8 +67,9 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
             if len(made.phase.levels) > 1:
                 backend = "proxqp"  # the one that has levels
             loop = wb.Loop(
-                robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles, velocity=velocity
-            )
+                robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles,
+                velocity=velocity, acceleration=acceleration,
+            )  # fmt: skip
         except wb.WbplanError as error:
             out.counts[f"phase refused: {kind_of(error)}"] += 1
             continue
@@ -70,11 +78,13 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
         polygon = loop.compiled.polygon
         region = (polygon.normals, polygon.offsets) if polygon is not None and loop.compiled.region else None
         bounds = loop.compiled.acceleration
-        watch = Watch(robot, made.phase, q, dt, held, region, bounds, velocity)
+        watch = Watch(robot, made.phase, q, dt, held, region, bounds, velocity, acceleration)
         _run_phase(rng, loop, made, watch, out, backend, min(LONGEST, most - out.ticks))
         out.add({}, watch.worst, [])
         q, roles = np.array(loop.q), loop.compiled.roles
-        velocity = np.array(loop.velocity) if rng.random() < 0.5 else None
+        moves = rng.random() < 0.5
+        velocity = np.array(loop.velocity) if moves else None
+        acceleration = np.array(loop.acceleration) if moves else None
         if out.found or out.ticks >= most:
             break
     return out
@@ -89,6 +99,7 @@ def _run_phase(
             if rng.random() < 0.05:
                 jump(rng, live, far)
         q, t = loop.q.copy(), loop.t
+        began = time.process_time()
         try:
             tick = loop.step()
         except wb.WbplanError as error:
@@ -99,6 +110,11 @@ def _run_phase(
             if refused >= REFUSALS:
                 return
             continue
+        finally:
+            took = time.process_time() - began
+            out.slowest = max(out.slowest, took)
+            if took > ENDLESS:
+                out.found.append(f"a tick took {took:.1f} s ({backend}, {loop.compiled.robot.name})")
         refused = 0
         out.counts[f"ticks {backend}"] += 1
         if tick.warning:
