@@ -17,7 +17,7 @@ from soak_watch import Watch
 import wbplan as wb
 
 LONGEST = 800  #: ticks of one phase
-ENDLESS = 5.0  #: [s] of the processor's time, that a tick may take; the first ones compile
+ENDLESS = 30.0  #: [s] of the processor's time, that a tick may take; the first ones compile
 REFUSALS = 3  #: in a row, then the phase is given up
 
 
