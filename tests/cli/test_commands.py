@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import wbplan as wb
-from wbplan import cli
 from wbplan.bundle import Bundle
+from wbplan.cli import commands as cli
 
 Refused = Callable[..., str]
 Call = Callable[..., Any]
@@ -243,7 +243,7 @@ def test_a_taken_port(refused: Refused, bundle: Path) -> None:
 
 STRETCHED = '''"""Stretched: the body rises until the legs are at their end."""
 import wbplan as wb
-from wbplan import cli
+from wbplan.cli import commands as cli
 from wbplan.bundle import Bundle
 ROBOT = "mana"
 def script(robot):

@@ -5,20 +5,19 @@ matplotlib is imported when a picture is made, not before, and nothing of pyplot
 
 from __future__ import annotations
 
-import io
-import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import NO_MARGIN, Bundle
-from wbplan.errors import BundleError, SpecError
+from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.pictures import blank, write
 from wbplan.plots.measures import draw_measures
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SIZE, DPI = (15.0, 11.0), 110  #: [inch], dots an inch
+SIZE = (15.0, 11.0)  #: [inch]
 TIME = "viridis"  #: colour map of time
 INK, FAINT, BOUND = "#22303c", "#8a97a3", "#c0392b"
 MOST_LINES = 8  #: tasks with a line of their own in a panel
@@ -40,12 +39,7 @@ def save(bundle: Bundle, path: str | Path) -> Path:
     Raises:
         BundleError: the file cannot be written.
     """
-    path = Path(path)
-    try:
-        path.write_bytes(png(figure(bundle)))
-    except OSError as error:
-        raise BundleError(f"{path}: cannot be written: {error.strerror or error}") from error
-    return path
+    return write(figure(bundle), path)
 
 
 def figure(bundle: Bundle) -> Figure:
@@ -54,15 +48,7 @@ def figure(bundle: Bundle) -> Figure:
     Left: the CoM's path in the support polygons, seen from above, and the base's pose. Right, over time:
     the margin and what was promised, the tasks' errors, and every joint within its limits.
     """
-    from matplotlib.figure import Figure
-
-    class Plan(Figure):
-        """A figure that needs no pyplot to be shown."""
-
-        def _repr_png_(self) -> bytes:
-            return png(self)
-
-    drawing = Plan(figsize=SIZE, dpi=DPI, layout="constrained", facecolor="white")
+    drawing = blank(*SIZE)
     engine: Any = drawing.get_layout_engine()
     engine.set(w_pad=0.06, h_pad=0.05)
     columns = drawing.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
@@ -79,17 +65,6 @@ def figure(bundle: Bundle) -> Figure:
     _errors(panels[1], bundle, ("orientation", "joints"), "rad")
     _joints(drawing, panels[2], bundle)
     return drawing
-
-
-def png(drawing: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    file, canvas = io.BytesIO(), cast(Any, FigureCanvasAgg(drawing))
-    with warnings.catch_warnings():  # labels of absurd numbers leave no room
-        warnings.simplefilter("ignore", UserWarning)
-        canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
-    return file.getvalue()
 
 
 # --------------------------------------------------------------------------------------------------- balance
