@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 SIZE = (15.0, 11.0)  #: [inch]
 TIME = "viridis"  #: colour map of time
 INK, FAINT, BOUND = "#22303c", "#8a97a3", "#c0392b"
+FEW = 12  #: support polygons that can be told apart
+DASHED = (0, (4, 3))
 MOST_LINES = 8  #: tasks with a line of their own in a panel
 FLOOR = 1e-8  #: errors below it are drawn at it: nothing is learnt from less
 
@@ -94,29 +96,21 @@ def _top_view(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
 
     motion = bundle.trajectory
     clock = Normalize(motion.time[0], motion.time[-1])
-    drawn: set[tuple[float, ...]] = set()
     named: list[tuple[str, Array]] = []
+    outlines: dict[tuple[float, ...], tuple[dict[str, Any], HalfPlanes]] = {}
     for phase, feet, polygon in _polygons(bundle):
         for contact, foot in zip(phase["contacts"], feet, strict=True):
             if all(contact["frame"] != n or np.linalg.norm(foot - p) > 5e-3 for n, p in named):
                 named.append((contact["frame"], foot))
-        if polygon is None:
-            continue
-        key = (round(phase["margin"], 4), *np.round(polygon.vertices, 3).ravel())
-        if key in drawn:
-            continue
-        drawn.add(key)
-        color = colormaps[TIME](clock(phase["start"]))
-        axes.fill(
-            *polygon.vertices.T, facecolor=(*color[:3], 0.05), edgecolor=(*color[:3], 0.8), linewidth=1.2
-        )
-        inset = polygon.inset(max(phase["margin"], 0.0))
-        if phase["margin"] > 0.0 and len(inset):
-            axes.fill(
-                *inset.T, facecolor="none", edgecolor=(*color[:3], 0.7), linewidth=0.9, linestyle=(0, (4, 3))
-            )
+        if polygon is not None:
+            key = (round(phase["margin"], 4), *np.round(polygon.vertices, 3).ravel())
+            outlines.setdefault(key, (phase, polygon))
+    faint = min(1.0, FEW / max(len(outlines), 1))
+    for phase, polygon in outlines.values():
+        _outline(axes, phase, polygon, colormaps[TIME](clock(phase["start"])), faint)
     axes.plot([], [], color=FAINT, linewidth=1.2, label="support polygon, by phase")
-    axes.plot([], [], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), label="promised margin inside it")
+    if faint == 1.0:
+        axes.plot([], [], color=FAINT, linewidth=0.9, linestyle=DASHED, label="promised margin inside it")
     _feet(axes, named)
     path = motion.com[:, :2]
     pieces = LineCollection(
@@ -142,6 +136,15 @@ def _top_view(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
     bar = drawing.colorbar(pieces, cax=axes.inset_axes((1.02, 0.0, 0.025, 1.0)))
     bar.set_label("time [s]")
     bar.outline.set_visible(False)
+
+
+def _outline(axes: Axes, phase: dict[str, Any], polygon: HalfPlanes, color: Any, faint: float) -> None:
+    """A support polygon, and the promised margin in it unless there are too many to tell apart."""
+    edge: Any = {"edgecolor": (*color[:3], 0.8 * faint), "linewidth": 0.4 + 0.8 * faint}
+    axes.fill(*polygon.vertices.T, facecolor=(*color[:3], 0.05 * faint), **edge)
+    inset = polygon.inset(max(phase["margin"], 0.0))
+    if faint == 1.0 and phase["margin"] > 0.0 and len(inset):
+        axes.fill(*inset.T, facecolor="none", edgecolor=(*color[:3], 0.7), linewidth=0.9, linestyle=DASHED)
 
 
 def _feet(axes: Axes, named: list[tuple[str, Array]]) -> None:
