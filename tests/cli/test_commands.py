@@ -14,7 +14,7 @@ import pytest
 
 import wbplan as wb
 from wbplan.bundle import Bundle
-from wbplan.cli import commands as cli
+from wbplan.cli import commands
 
 Refused = Callable[..., str]
 Call = Callable[..., Any]
@@ -243,8 +243,6 @@ def test_a_taken_port(refused: Refused, bundle: Path) -> None:
 
 STRETCHED = '''"""Stretched: the body rises until the legs are at their end."""
 import wbplan as wb
-from wbplan.cli import commands as cli
-from wbplan.bundle import Bundle
 ROBOT = "mana"
 def script(robot):
     stand = robot.state("stand")
@@ -270,14 +268,14 @@ def test_a_bundle_replaced_while_it_is_simulated_gets_no_verdict(
     wbplan: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert wbplan("run", "sway.py", "--out", "a").code == 0
-    real = cli.replay
+    real = commands.replay
 
     def replay(bundle: Bundle, **asked: object) -> object:
         done = real(bundle, **asked)
-        assert cli.main(["run", "sway.py", "--out", "a", "--set", "sway=0.005"]) == 0
+        assert commands.main(["run", "sway.py", "--out", "a", "--set", "sway=0.005"]) == 0
         return done
 
-    monkeypatch.setattr(cli, "replay", replay)
+    monkeypatch.setattr(commands, "replay", replay)
     ran = wbplan("simulate", "a")
     assert ran.code == 2
     assert "was replaced while it was simulated" in ran.err
