@@ -26,7 +26,7 @@ from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.active import Active, HeldBack
 from wbplan.explain.replay import Replay
 from wbplan.explain.why import Why, keep_goals
-from wbplan.paths import number, vector
+from wbplan.paths import ask, number, vector
 from wbplan.problem.bodies import Body
 from wbplan.problem.script import Phase
 from wbplan.program.diagnose import solve_error
@@ -247,7 +247,7 @@ class Loop:
         for target in self.compiled.frame_targets:
             if target.root != WORLD or target.label.startswith("contact("):
                 continue
-            value = target.path.at(self.t)
+            value = ask(target.path, self.t)
             if not isinstance(value, pin.SE3):
                 if np.shape(value) != (3,):
                     continue
