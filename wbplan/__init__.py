@@ -1,11 +1,8 @@
 """wbplan: whole-body plans for legged robots that also manipulate."""
 
 from wbplan import gaits
-from wbplan.active import Active
-from wbplan.bodies import Body, Carried, Grip
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.contacts import Contact, Push
 from wbplan.errors import (
     BundleError,
     CheckFailed,
@@ -17,15 +14,18 @@ from wbplan.errors import (
     ViewError,
     WbplanError,
 )
-from wbplan.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
-from wbplan.objectives import BalanceTask, ManipulabilityTask
+from wbplan.explain.active import Active
+from wbplan.explain.why import Reason, Why
 from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot, load_robot
-from wbplan.script import Phase, Script
-from wbplan.state import State
-from wbplan.tasks import (
+from wbplan.spec.bodies import Body, Carried, Grip
+from wbplan.spec.contacts import Contact, Push
+from wbplan.spec.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.spec.objectives import BalanceTask, ManipulabilityTask
+from wbplan.spec.script import Phase, Script
+from wbplan.spec.tasks import (
     ComTask,
     DampingTask,
     OrientationTask,
@@ -35,9 +35,9 @@ from wbplan.tasks import (
     RelativePoseTask,
     Task,
 )
+from wbplan.state import State
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION as __version__
-from wbplan.why import Reason, Why
 
 __all__ = [
     "AS_IS",

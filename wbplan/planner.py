@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.acceleration import acceleration_bounds, braking_bounds
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.acceleration import acceleration_bounds, braking_bounds
+from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.explain.why import Why
 from wbplan.fallback import Retries
 from wbplan.paths import number
 from wbplan.reasons import why_at
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
-from wbplan.script import Phase, Script
+from wbplan.spec.script import Phase, Script
 from wbplan.state import State
 from wbplan.tick import Loop
-from wbplan.why import Why
 
 if TYPE_CHECKING:
     from wbplan.physics import Simulation
@@ -94,7 +94,8 @@ class Plan:
         Raises:
             BundleError: the folder cannot be written.
         """
-        from wbplan import forceplots, plots
+        from wbplan.plots import forces as forceplots
+        from wbplan.plots import overview as plots
         from wbplan.view import write_html
 
         return self.bundle.write(

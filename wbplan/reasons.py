@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import Trajectory
 from wbplan.errors import SpecError
+from wbplan.explain.why import Why
 from wbplan.paths import number
 from wbplan.tick import Loop, Tick
-from wbplan.why import Why
 
 Array = NDArray[np.float64]
 

@@ -19,22 +19,22 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.active import Active, HeldBack
 from wbplan.backends import make_backend
-from wbplan.bodies import Body
-from wbplan.compiled import WORLD, CompiledPhase, compile_phase
-from wbplan.diagnose import solve_error
+from wbplan.compiled.given import check_given
+from wbplan.compiled.phase import WORLD, CompiledPhase, compile_phase
 from wbplan.errors import SolveError, SpecError, WbplanError
-from wbplan.given import check_given
+from wbplan.explain.active import Active, HeldBack
+from wbplan.explain.replay import Replay
+from wbplan.explain.why import Why, keep_goals
 from wbplan.paths import number, vector
-from wbplan.qp import Solution
-from wbplan.replay import Replay
-from wbplan.retract import DRIFT, Retraction
+from wbplan.program.diagnose import solve_error
+from wbplan.program.qp import Solution
+from wbplan.program.retract import DRIFT, Retraction
+from wbplan.program.stack import Stack
 from wbplan.robot import Robot
-from wbplan.script import Phase
-from wbplan.stack import Stack
+from wbplan.spec.bodies import Body
+from wbplan.spec.script import Phase
 from wbplan.state import State
-from wbplan.why import Why, keep_goals
 
 Array = NDArray[np.float64]
 

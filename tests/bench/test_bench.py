@@ -18,7 +18,7 @@ from wbplan.bench.__main__ import main
 from wbplan.bench.breakdown import PARTS, breakdown
 from wbplan.bench.solvers import pink_is_installed
 from wbplan.errors import BundleError
-from wbplan.stack import Stack
+from wbplan.program.stack import Stack
 
 TICKS = 120  # two rounds and a bit: over a second of the path
 OURS = {"kinematics-floor", "placo", "wbplan-proxqp", "wbplan-placo"}

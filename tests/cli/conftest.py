@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wbplan.cli import main
+from wbplan.cli.commands import main
 
 # Four feet would do, but six are what "stand" stands on; the body sways by `sway`.
 SWAY = '''"""Sway: the body moves sideways on six feet.

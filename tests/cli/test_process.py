@@ -105,7 +105,7 @@ def test_a_disk_that_is_full_leaves_the_earlier_bundle(tmp_path: Path) -> None:
         assert process.wait(timeout=120) == 0
     before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
     limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); "
-    limited += "from wbplan.cli import main; sys.exit(main(['run', 'short.py']))"
+    limited += "from wbplan.cli.commands import main; sys.exit(main(['run', 'short.py']))"
     done = subprocess.run(
         [sys.executable, "-c", limited],
         cwd=tmp_path,

@@ -11,7 +11,7 @@ import pytest
 
 import wbplan as wb
 from wbplan.collision import CAPACITY
-from wbplan.stack import UNBOUNDED
+from wbplan.program.stack import UNBOUNDED
 
 MakeRobot = Callable[[str, str], wb.Robot]
 SHAPES = ("sphere", "box", "cylinder", "mesh")

@@ -22,11 +22,12 @@ from fuzz_python import mutate_python
 from fuzz_text import chance, mutate_json, mutate_xml, scarred
 
 import wbplan as wb
-from wbplan import catalog, plots
+from wbplan import catalog
 from wbplan.errors import WbplanError
 from wbplan.physics import Options
 from wbplan.physics.motion import motion_of
 from wbplan.physics.scene import scene_of
+from wbplan.plots import overview as plots
 from wbplan.taskfile import glance, load_task
 from wbplan.view.playback import page
 from wbplan.view.robot_meshes import robot_meshes

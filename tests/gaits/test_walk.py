@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wbplan as wb
+from wbplan.cli.survey import clearance
 from wbplan.gaits import Gait, Manner, Stance, Walk, Walker, comfortable, gait_for, straight, walk
-from wbplan.survey import clearance
 
 HEAVY = Walker(wb.load_robot("heavy_hexapod"))
 MANA = Walker(wb.load_robot("mana"))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from wbplan.joint_box import BRAKING, NEVER, _ways_to_rest, box, brake, jerk_box, stopping
+from wbplan.program.joint_box import BRAKING, NEVER, _ways_to_rest, box, brake, jerk_box, stopping
 
 TICKS = 150
 seeds = st.integers(0, 2**32 - 1)

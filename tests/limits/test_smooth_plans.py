@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 import wbplan as wb
-from wbplan.acceleration import RISE, SHARE, acceleration_bounds, limb_inertia, standing_inertia
 from wbplan.bundle import Bundle
 from wbplan.checks import check
+from wbplan.compiled.acceleration import RISE, SHARE, acceleration_bounds, limb_inertia, standing_inertia
 
 FEET = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot", "limb1_foot", "limb2_foot")
 

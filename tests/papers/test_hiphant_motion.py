@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wbplan as wb
-from wbplan.ascent import FOLLOW, curvature_bound
 from wbplan.papers import hiphant_motion
+from wbplan.program.ascent import FOLLOW, curvature_bound
 
 from .conftest import Judge
 from .null_space import NullSpace

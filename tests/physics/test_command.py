@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wbplan import cli
-from wbplan.cli import main
+from wbplan.cli.commands import main
 from wbplan.physics import ghost_of, simulate
 from wbplan.view import page
 

@@ -12,9 +12,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from wbplan import plots
 from wbplan.bundle import NO_MARGIN, Bundle
 from wbplan.errors import BundleError
+from wbplan.plots import overview as plots
 
 
 def texts(drawing: Figure) -> set[str]:

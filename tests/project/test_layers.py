@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,56 +20,28 @@ LAYERS = [
     "catalog",
     "robot",
     "mechanism",
-    "tasks",
-    "objectives",
-    "contacts",
-    "limits",
-    "bodies",
-    "script",
-    "acceleration",
+    "spec",
     "statics",
-    "aims",
     "compiled",
-    "given",
-    "kinematics",
     "collision",
-    "kernels",
-    "joint_box",
     "sampling",
     "gaits",
-    "rows",
-    "posture",
-    "levels",
-    "nullspace",
-    "blocks",
-    "ascent",
-    "stack",
-    "diagnose",
-    "qp",
-    "active",
-    "sensitivity",
-    "why",
-    "retract",
+    "program",
     "backends",
-    "replay",
+    "explain",
     "tick",
     "fallback",
     "bundle",
     "checks",
-    "measures",
     "plots",
-    "forceplots",
     "view",
     "physics",
     "reasons",
     "recorder",
     "planner",
-    "survey",
     "taskfile",
     "papers",
     "bench",
-    "live",
-    "printing",
     "cli",
 ]
 ROOT = Path(__file__).resolve().parents[2]
@@ -130,6 +103,44 @@ def test_imports_only_from_above(path: Path) -> None:
 )
 def test_an_import_from_below_is_seen(source: str) -> None:
     assert faults(PACKAGE / "geometry.py", source)
+
+
+def at_run_time(node: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a tree, less those that only a type checker sees."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
+            yield from at_run_time(child)
+
+
+def rooms() -> dict[str, set[str]]:
+    """Every file of a package by its dotted name, and the files of the same package that it imports."""
+    names = {".".join(p.relative_to(PACKAGE).with_suffix("").parts): p for p in FILES}
+    found: dict[str, set[str]] = {}
+    for name, path in names.items():
+        if "." not in name or name.endswith("__init__"):
+            continue
+        found[name] = set()
+        for node in at_run_time(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("wbplan."):
+                module = node.module.removeprefix("wbplan.")
+                those = [module, *(f"{module}.{a.name}" for a in node.names)]
+                found[name] |= {m for m in those if m in names and m.split(".")[0] == name.split(".")[0]}
+    return found
+
+
+def circle(imports: dict[str, set[str]]) -> list[str]:
+    """Names that import each other in a loop, or none."""
+    left = {name: set(seen) for name, seen in imports.items()}
+    while free := {name for name, seen in left.items() if not seen & left.keys()}:
+        left = {name: seen for name, seen in left.items() if name not in free}
+    return sorted(left)
+
+
+def test_no_two_files_of_a_package_import_each_other() -> None:
+    assert len(rooms()) > 100
+    assert circle(rooms()) == []
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["a", "b", "c"]
 
 
 def test_what_planned_never_approves() -> None:

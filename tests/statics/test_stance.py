@@ -10,7 +10,7 @@ import pytest
 
 import wbplan as wb
 from wbplan.bundle import Bundle
-from wbplan.compiled import compile_phase
+from wbplan.compiled.phase import compile_phase
 from wbplan.statics import push_load
 
 SLOPE = 0.25  # [rad], inward: the six feet stand in a bowl

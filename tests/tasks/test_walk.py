@@ -10,7 +10,7 @@ import pytest
 
 import wbplan as wb
 from wbplan import catalog
-from wbplan.cli import main
+from wbplan.cli.commands import main
 from wbplan.gaits import gaits_for, quadrangular
 from wbplan.taskfile import load_task
 

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbplan as wb
-from wbplan.aims import Settle
-from wbplan.compiled import compile_phase
+from wbplan.compiled.aims import Settle
+from wbplan.compiled.phase import compile_phase
 from wbplan.geometry import support_polygon
 
 FEET = ["rf_foot", "lf_foot", "rr_foot", "lr_foot"]

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wbplan as wb
-from wbplan.compiled import compile_phase
-from wbplan.stack import Stack
+from wbplan.compiled.phase import compile_phase
+from wbplan.program.stack import Stack
 
 STEP = 1e-6
 

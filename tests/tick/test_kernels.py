@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 import wbplan as wb
 from wbplan.backends.kkt import ActiveSetGuess
-from wbplan.kernels import log_derivative, rotation_log
-from wbplan.qp import Multipliers
+from wbplan.program.kernels import log_derivative, rotation_log
+from wbplan.program.qp import Multipliers
+from wbplan.program.stack import Stack
 from wbplan.sampling import sample
-from wbplan.stack import Stack
 
 angles = st.floats(0.0, np.pi - 1e-6)
 components = st.floats(-1.0, 1.0)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import wbplan as wb
 from wbplan.backends.curvature import Curvature
-from wbplan.stack import Stack
+from wbplan.program.stack import Stack
 
 FEET = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")
 LIMITS = (wb.JointLimits(), wb.SupportPolygon(0.02))

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wbplan as wb
-from wbplan.ascent import Ascent, curvature_bound
-from wbplan.compiled import compile_phase
-from wbplan.stack import Stack
+from wbplan.compiled.phase import compile_phase
+from wbplan.program.ascent import Ascent, curvature_bound
+from wbplan.program.stack import Stack
 
 ROWS = {"translation": slice(0, 3), "rotation": slice(3, 6), "whole": slice(0, 6)}
 LEGS = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbplan as wb
-from wbplan.why import UNITS
+from wbplan.explain.why import UNITS
 
 FEET = ("leg3_foot", "leg4_foot", "leg5_foot", "leg6_foot")
 STACKS = {

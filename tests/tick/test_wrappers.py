@@ -13,7 +13,7 @@ import pytest
 
 import wbplan as wb
 from wbplan.backends.wrappers import WRAPPERS, Wrappers
-from wbplan.compiled import CompiledPhase, compile_phase
+from wbplan.compiled.phase import CompiledPhase, compile_phase
 
 
 class Owner:

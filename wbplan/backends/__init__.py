@@ -7,8 +7,8 @@ from collections.abc import Callable
 from wbplan.backends.placo import PlacoBackend
 from wbplan.backends.proxqp import ProxqpBackend
 from wbplan.errors import SpecError
-from wbplan.qp import Backend
-from wbplan.stack import Stack
+from wbplan.program.qp import Backend
+from wbplan.program.stack import Stack
 
 __all__ = ["BACKENDS", "Backend", "make_backend"]
 

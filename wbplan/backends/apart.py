@@ -11,9 +11,9 @@ import numpy as np
 import proxsuite
 from numpy.typing import NDArray
 
-from wbplan.diagnose import solve_error
-from wbplan.joint_box import UNBOUNDED
-from wbplan.stack import Stack
+from wbplan.program.diagnose import solve_error
+from wbplan.program.joint_box import UNBOUNDED
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

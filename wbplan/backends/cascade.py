@@ -27,10 +27,10 @@ from scipy.linalg import lapack
 
 from wbplan.backends.curvature import Curvature
 from wbplan.backends.kkt import ROUNDING
-from wbplan.levels import Level
-from wbplan.nullspace import null_basis
-from wbplan.qp import LevelSolution, Multipliers
-from wbplan.stack import REGULARISATION, Stack
+from wbplan.program.levels import Level
+from wbplan.program.nullspace import null_basis
+from wbplan.program.qp import LevelSolution, Multipliers
+from wbplan.program.stack import REGULARISATION, Stack
 
 Array = NDArray[np.float64]
 

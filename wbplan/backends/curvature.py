@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from wbplan.compiled import WORLD, FrameTarget
-from wbplan.stack import Stack
+from wbplan.compiled.phase import WORLD, FrameTarget
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

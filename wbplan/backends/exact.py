@@ -13,9 +13,9 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.joint_box import UNBOUNDED
-from wbplan.qp import Multipliers
-from wbplan.stack import Stack
+from wbplan.program.joint_box import UNBOUNDED
+from wbplan.program.qp import Multipliers
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

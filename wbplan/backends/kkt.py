@@ -25,8 +25,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from wbplan.qp import Multipliers
-from wbplan.stack import Stack
+from wbplan.program.qp import Multipliers
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

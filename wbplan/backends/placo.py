@@ -21,16 +21,16 @@ import pinocchio as pin
 import placo
 from numpy.typing import NDArray
 
-from wbplan.aims import ComTarget
 from wbplan.backends.apart import keep_apart
 from wbplan.backends.placo_ascent import PlacoAscent
 from wbplan.backends.wrappers import WRAPPERS
-from wbplan.compiled import WORLD, FrameTarget
-from wbplan.diagnose import solve_error
+from wbplan.compiled.aims import ComTarget
+from wbplan.compiled.phase import WORLD, FrameTarget
 from wbplan.errors import SpecError
-from wbplan.joint_box import UNBOUNDED
-from wbplan.qp import Solution
-from wbplan.stack import REGULARISATION, Stack
+from wbplan.program.diagnose import solve_error
+from wbplan.program.joint_box import UNBOUNDED
+from wbplan.program.qp import Solution
+from wbplan.program.stack import REGULARISATION, Stack
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from typing import Any, final
 import numpy as np
 import pinocchio as pin
 
-from wbplan.ascent import Ascent
-from wbplan.stack import Stack
+from wbplan.program.ascent import Ascent
+from wbplan.program.stack import Stack
 
 
 @final

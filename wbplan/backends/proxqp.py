@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from wbplan.backends.cascade import Cascade
 from wbplan.backends.exact import ExactSolver
 from wbplan.backends.kkt import ActiveSetGuess
-from wbplan.diagnose import solve_error
-from wbplan.joint_box import UNBOUNDED
-from wbplan.qp import LevelSolution, Multipliers, Solution
-from wbplan.stack import Stack
+from wbplan.program.diagnose import solve_error
+from wbplan.program.joint_box import UNBOUNDED
+from wbplan.program.qp import LevelSolution, Multipliers, Solution
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

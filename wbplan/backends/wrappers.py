@@ -15,7 +15,7 @@ from typing import Any, final
 import placo
 from lxml import etree
 
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.phase import CompiledPhase
 
 _LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit")
 

@@ -16,7 +16,7 @@ from wbplan.backends import BACKENDS
 from wbplan.bench.race import COLD
 from wbplan.bench.scenes import Scene
 from wbplan.bench.solvers import Wbplan
-from wbplan.stack import Stack
+from wbplan.program.stack import Stack
 
 #: What is timed, and what is told of it.
 PARTS: Mapping[str, str] = {

@@ -19,7 +19,7 @@ import qpsolvers
 from numpy.typing import NDArray
 
 from wbplan.bench.scenes import POSTURE_GAIN, POSTURE_WEIGHT, Scene
-from wbplan.bench.solvers import Solver
+from wbplan.bench.solver import Solver
 
 Array = NDArray[np.float64]
 

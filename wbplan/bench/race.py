@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bench.scenes import Scene
-from wbplan.bench.solvers import Solver
+from wbplan.bench.solver import Solver
 
 Array = NDArray[np.float64]
 

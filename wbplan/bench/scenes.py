@@ -18,15 +18,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.bodies import Body, Carried
-from wbplan.compiled import CompiledPhase, compile_phase
-from wbplan.contacts import Contact
-from wbplan.limits import JointLimits, SupportPolygon
+from wbplan.compiled.phase import CompiledPhase, compile_phase
 from wbplan.paths import Path, Waypoints
 from wbplan.robot import Robot, load_robot
-from wbplan.script import Phase
+from wbplan.spec.bodies import Body, Carried
+from wbplan.spec.contacts import Contact
+from wbplan.spec.limits import JointLimits, SupportPolygon
+from wbplan.spec.script import Phase
+from wbplan.spec.tasks import PoseTask, PostureTask, RelativePoseTask, Task
 from wbplan.state import State
-from wbplan.tasks import PoseTask, PostureTask, RelativePoseTask, Task
 
 Array = NDArray[np.float64]
 

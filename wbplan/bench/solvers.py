@@ -7,7 +7,6 @@ only in part. It also measures what it has done, corrects drift, and refuses ste
 
 from __future__ import annotations
 
-import abc
 from importlib.util import find_spec
 from typing import final
 
@@ -17,33 +16,12 @@ import placo
 from lxml import etree
 from numpy.typing import NDArray
 
+from wbplan.bench.pink_solver import fastest_pink
 from wbplan.bench.scenes import POSTURE_WEIGHT, Scene
+from wbplan.bench.solver import Solver
 from wbplan.tick import Loop
 
 Array = NDArray[np.float64]
-
-
-class Solver(abc.ABC):
-    """One of those that are timed.
-
-    Attributes:
-        name: in the table.
-        note: what a reader has to know about its number.
-        moves: whether it follows the path at all.
-    """
-
-    name: str
-    note: str = ""
-    moves: bool = True
-
-    @abc.abstractmethod
-    def tick(self, k: int) -> None:
-        """Go on to sample `k` (1, 2, ...): all that is timed."""
-
-    @property
-    @abc.abstractmethod
-    def q(self) -> Array:
-        """(nq,) the whole robot's configuration now."""
 
 
 @final
@@ -157,8 +135,6 @@ def make_solvers(scene: Scene) -> tuple[list[Solver], list[tuple[str, str]]]:
     peers: list[Solver] = [Floor(scene), Placo(scene)]
     if not pink_is_installed():
         return [*peers, *ours], [("pink", "not installed: pip install 'wbplan[bench]'")]
-    from wbplan.bench.pink_solver import fastest_pink
-
     found, why = fastest_pink(scene)
     if found is None:
         return [*peers, *ours], [("pink", why)]

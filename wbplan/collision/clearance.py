@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from wbplan.collision import kernels
 from wbplan.collision.fields import Field
 from wbplan.collision.model import CollisionModel
-from wbplan.kinematics import Kinematics
+from wbplan.compiled.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -26,11 +26,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
-from wbplan.limits import SelfCollision
 from wbplan.obstacles import Box, Cylinder, HeightField, Mesh, Obstacle, Sphere
 from wbplan.robot import Robot
+from wbplan.spec.limits import SelfCollision
 from wbplan.state import find_frame
 
 Array = NDArray[np.float64]

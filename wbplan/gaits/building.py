@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, PchipInterpolator
 
-from wbplan.contacts import Contact
 from wbplan.errors import GaitError, SpecError
 from wbplan.gaits.balance import Stay, Sway, common_margins, largest_margin, sway
 from wbplan.gaits.gait import Gait
@@ -20,12 +19,13 @@ from wbplan.gaits.schedule import Ground, Schedule, Step, flat
 from wbplan.gaits.stance import Stance, Walker
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.geometry import support_polygon
-from wbplan.limits import JointLimits, SupportPolygon
 from wbplan.paths import number
 from wbplan.robot import Robot
-from wbplan.script import Phase, Script
+from wbplan.spec.contacts import Contact
+from wbplan.spec.limits import JointLimits, SupportPolygon
+from wbplan.spec.script import Phase, Script
+from wbplan.spec.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 from wbplan.state import State
-from wbplan.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 
 Array = NDArray[np.float64]
 Fields = Callable[[Step], Mapping[str, Any]]

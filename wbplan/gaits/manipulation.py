@@ -22,7 +22,7 @@ from wbplan.gaits.stance import Walker
 from wbplan.mechanism import FiveJointLimb, limb_chain
 from wbplan.paths import POSE, Hold, Path, Value, as_path, number
 from wbplan.sampling import Samples, sample
-from wbplan.tasks import PoseTask, Task
+from wbplan.spec.tasks import PoseTask, Task
 
 Array = NDArray[np.float64]
 

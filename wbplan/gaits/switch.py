@@ -24,8 +24,8 @@ from wbplan.gaits.manipulation import beside_way
 from wbplan.gaits.schedule import Beat, Ground, Schedule, Step, flat
 from wbplan.gaits.stance import Stance, Walker
 from wbplan.paths import AS_IS, MinJerk, name_of, number
-from wbplan.script import Phase
-from wbplan.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
+from wbplan.spec.script import Phase
+from wbplan.spec.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 
 Array = NDArray[np.float64]
 Fields = Mapping[str, Any]

@@ -7,16 +7,16 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.compiled import compile_phase
-from wbplan.contacts import Contact
+from wbplan.compiled.phase import compile_phase
 from wbplan.geometry import support_polygon
-from wbplan.objectives import ManipulabilityTask
 from wbplan.papers.hiphant import configuration
 from wbplan.papers.rows import Row
 from wbplan.planner import Plan, plan
+from wbplan.program.stack import Stack
 from wbplan.robot import load_robot
-from wbplan.script import Phase
-from wbplan.stack import Stack
+from wbplan.spec.contacts import Contact
+from wbplan.spec.objectives import ManipulabilityTask
+from wbplan.spec.script import Phase
 from wbplan.state import State
 from wbplan.taskfile import load_task
 

@@ -10,17 +10,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wbplan.contacts import Contact
 from wbplan.errors import SolveError
-from wbplan.limits import JointLimits
 from wbplan.mechanism import Follower, Platform, forward
 from wbplan.papers.mana import JOINTS, LEGS, TABLE_5, TABLE_6, named, numbers, pose, stance
 from wbplan.papers.rows import Row
 from wbplan.paths import Waypoints
 from wbplan.planner import plan
 from wbplan.robot import load_robot
-from wbplan.script import Phase, Script
-from wbplan.tasks import PoseTask
+from wbplan.spec.contacts import Contact
+from wbplan.spec.limits import JointLimits
+from wbplan.spec.script import Phase, Script
+from wbplan.spec.tasks import PoseTask
 
 Array = NDArray[np.float64]
 row = partial(Row, "MANA")

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.bodies import Grip, Held
 from wbplan.errors import SolveError
-from wbplan.script import Phase
+from wbplan.spec.bodies import Grip, Held
+from wbplan.spec.script import Phase
 from wbplan.statics.grip import Squeeze, box_normal, force_closure, smallest_squeeze
 
 Array = NDArray[np.float64]

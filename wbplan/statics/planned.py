@@ -9,10 +9,10 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.bodies import Held
 from wbplan.errors import SolveError, SpecError
-from wbplan.limits import Forces
-from wbplan.script import Phase
+from wbplan.spec.bodies import Held
+from wbplan.spec.limits import Forces
+from wbplan.spec.script import Phase
 from wbplan.statics.clamp import Clamp, clamps_of
 from wbplan.statics.cones import friction_use
 from wbplan.statics.forces import ForceQP, effort, least_effort, within

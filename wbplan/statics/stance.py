@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.bodies import frame_number
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
-from wbplan.script import Phase
+from wbplan.spec.bodies import frame_number
+from wbplan.spec.script import Phase
+from wbplan.spec.tasks import FrameTask
 from wbplan.state import State
 from wbplan.statics.region import hull_is_exact, support_region
-from wbplan.tasks import FrameTask
 
 Array = NDArray[np.float64]
 

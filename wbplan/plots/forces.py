@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import NO_MARGIN, Bundle
 from wbplan.errors import BundleError
-from wbplan.plots import BOUND, DPI, FAINT, INK, png
+from wbplan.plots.overview import BOUND, DPI, FAINT, INK, png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import NO_MARGIN, Bundle
 from wbplan.errors import BundleError, SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
-from wbplan.measures import draw_measures
+from wbplan.plots.measures import draw_measures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.compiled import JointTarget
+from wbplan.compiled.phase import JointTarget
 from wbplan.paths import MinJerk, number
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.errors import SpecError, listing
-from wbplan.qp import Multipliers, Solution
-from wbplan.sensitivity import Held, Slopes, slopes
-from wbplan.stack import Stack
+from wbplan.explain.sensitivity import Held, Slopes, slopes
+from wbplan.program.qp import Multipliers, Solution
+from wbplan.program.stack import Stack
 from wbplan.state import State
 from wbplan.statics import ease_of_pushes
 

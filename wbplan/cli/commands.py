@@ -22,17 +22,17 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from wbplan import catalog
 from wbplan.bundle import Bundle, is_bundle
 from wbplan.checks import check as recompute
+from wbplan.cli.live import LiveView
+from wbplan.cli.printing import print_plan, print_robot, print_simulation
+from wbplan.cli.survey import setting, survey, table
 from wbplan.errors import BundleError, CheckFailed, GaitError, PlanFalls, SolveError, SpecError, WbplanError
 from wbplan.gaits import cycle_figure, gaits_for, mode_named
-from wbplan.live import LiveView
 from wbplan.papers import DIFFERS, report, summary
 from wbplan.physics import ghost_of
 from wbplan.physics import simulate as replay
 from wbplan.planner import plan
-from wbplan.printing import print_plan, print_robot, print_simulation
 from wbplan.robot import Robot, load_robot
-from wbplan.script import Script
-from wbplan.survey import setting, survey, table
+from wbplan.spec.script import Script
 from wbplan.taskfile import glance, load_task
 from wbplan.tick import Loop
 from wbplan.version import VERSION

@@ -8,15 +8,15 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, final
 
-from wbplan.bodies import Body, Carried
-from wbplan.contacts import Contact, Push
 from wbplan.errors import SpecError, listing
-from wbplan.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
-from wbplan.objectives import ManipulabilityTask, Objective
 from wbplan.obstacles import Obstacle
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
+from wbplan.spec.bodies import Body, Carried
+from wbplan.spec.contacts import Contact, Push
+from wbplan.spec.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.spec.objectives import ManipulabilityTask, Objective
+from wbplan.spec.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 from wbplan.state import State
-from wbplan.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 
 Limit = JointLimits | SupportPolygon | SelfCollision | Obstacles | Forces
 LIMITS = (JointLimits, SupportPolygon, SelfCollision, Obstacles, Forces)

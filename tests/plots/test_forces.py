@@ -10,8 +10,8 @@ import pytest
 from matplotlib.image import imread
 
 import wbplan as wb
-from wbplan import forceplots
 from wbplan.bundle import Bundle
+from wbplan.plots import forces as forceplots
 
 
 @pytest.fixture(scope="module")

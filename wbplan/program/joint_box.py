@@ -50,7 +50,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.phase import CompiledPhase
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan import kernels
+from wbplan.program import kernels
 
 Array = NDArray[np.float64]
 

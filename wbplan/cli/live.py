@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wbplan import reasons
 from wbplan.robot import Robot
-from wbplan.script import Script
+from wbplan.spec.script import Script
 from wbplan.tick import Loop
 from wbplan.view import Scene, Server
 

@@ -7,8 +7,8 @@ from typing import final
 
 import numpy as np
 
-from wbplan.qp import Multipliers, Solution
-from wbplan.stack import MARGIN_RESERVE, Stack
+from wbplan.program.qp import Multipliers, Solution
+from wbplan.program.stack import MARGIN_RESERVE, Stack
 
 #: A multiplier below this share of the soft tasks' pull does not count as holding the robot back.
 FAINT = 1e-3

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wbplan.bodies import frame_number
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
-from wbplan.objectives import KINDS, BalanceTask, ManipulabilityTask
 from wbplan.paths import POINT, Path
-from wbplan.script import Phase
+from wbplan.spec.bodies import frame_number
+from wbplan.spec.objectives import KINDS, BalanceTask, ManipulabilityTask
+from wbplan.spec.script import Phase
 from wbplan.state import State
 
 Array = NDArray[np.float64]

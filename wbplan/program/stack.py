@@ -21,17 +21,17 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan import kernels
-from wbplan.ascent import Ascent
-from wbplan.blocks import RowBlock, edge_names, name_rows
 from wbplan.collision import CAPACITY, SHARE, Clearance, collision_model
-from wbplan.compiled import CompiledPhase
-from wbplan.joint_box import RECOVERY, UNBOUNDED, JointBox
-from wbplan.kinematics import Kinematics
-from wbplan.levels import Level
+from wbplan.compiled.kinematics import Kinematics
+from wbplan.compiled.phase import CompiledPhase
 from wbplan.paths import number
-from wbplan.posture import Posture
-from wbplan.rows import Rows, levers
+from wbplan.program import kernels
+from wbplan.program.ascent import Ascent
+from wbplan.program.blocks import RowBlock, edge_names, name_rows
+from wbplan.program.joint_box import RECOVERY, UNBOUNDED, JointBox
+from wbplan.program.levels import Level
+from wbplan.program.posture import Posture
+from wbplan.program.rows import Rows, levers
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.backends import Backend, make_backend
-from wbplan.compiled import CompiledPhase
-from wbplan.joint_box import Pace
-from wbplan.qp import Solution
-from wbplan.stack import Stack
-from wbplan.why import Why, active_sets, explain, put_goals
+from wbplan.compiled.phase import CompiledPhase
+from wbplan.explain.why import Why, active_sets, explain, put_goals
+from wbplan.program.joint_box import Pace
+from wbplan.program.qp import Solution
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ class JointLimits:
     Args:
         speed: fraction of the URDF's speed limits that may be used, in (0, 1].
         acceleration: [rad/s^2, m/s^2], for all joints or by joint; where none is given, from the URDF's
-            effort limit and the inertia that the joint has to move (see `wbplan.acceleration`).
+            effort limit and the inertia that the joint has to move (see `wbplan.compiled.acceleration`).
         jerk: [rad/s^3, m/s^3], for all joints or by joint; no bound where none is given. Position and speed
             limits are then approached exponentially, which is slower than it would have to be.
 

@@ -30,11 +30,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.bodies import frame_number
 from wbplan.robot import Robot
-from wbplan.script import Phase, unknown
+from wbplan.spec.bodies import frame_number
+from wbplan.spec.script import Phase, unknown
+from wbplan.spec.tasks import FrameTask
 from wbplan.state import find_frame
-from wbplan.tasks import FrameTask
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import proxsuite
 from numpy.typing import NDArray
 
 from wbplan.errors import Relaxation, SolveError
-from wbplan.stack import Stack
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

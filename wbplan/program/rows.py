@@ -16,11 +16,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wbplan import kernels
-from wbplan.aims import ComTarget
-from wbplan.compiled import WORLD, CompiledPhase, FrameTarget
-from wbplan.kinematics import Kinematics
+from wbplan.compiled.aims import ComTarget
+from wbplan.compiled.kinematics import Kinematics
+from wbplan.compiled.phase import WORLD, CompiledPhase, FrameTarget
 from wbplan.paths import checked
+from wbplan.program import kernels
 from wbplan.sampling import sample
 
 Array = NDArray[np.float64]

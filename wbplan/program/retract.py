@@ -10,8 +10,8 @@ import pinocchio as pin
 import proxsuite
 from numpy.typing import NDArray
 
-from wbplan.joint_box import UNBOUNDED
-from wbplan.stack import Stack
+from wbplan.program.joint_box import UNBOUNDED
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

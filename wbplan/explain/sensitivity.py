@@ -18,9 +18,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.levels import Level
-from wbplan.nullspace import null_basis
-from wbplan.stack import Stack
+from wbplan.program.levels import Level
+from wbplan.program.nullspace import null_basis
+from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
 
 Array = NDArray[np.float64]

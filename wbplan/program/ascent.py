@@ -26,10 +26,10 @@ import pinocchio as pin
 from numba import njit
 from numpy.typing import NDArray
 
-from wbplan.aims import AscentTarget
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.aims import AscentTarget
+from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
-from wbplan.rows import reach, support_mask
+from wbplan.program.rows import reach, support_mask
 
 Array = NDArray[np.float64]
 

@@ -12,18 +12,18 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from wbplan.acceleration import acceleration_bounds, jerk_bounds, stopping_bounds
-from wbplan.aims import AscentTarget, ComTarget, ascent_target, balance_target
-from wbplan.bodies import Body, Held, frame_number, standing, with_carried
+from wbplan.compiled.acceleration import acceleration_bounds, jerk_bounds, stopping_bounds
+from wbplan.compiled.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
-from wbplan.objectives import BalanceTask, ManipulabilityTask
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
 from wbplan.robot import Robot
-from wbplan.script import Phase, unknown
+from wbplan.spec.bodies import Body, Held, frame_number, standing, with_carried
+from wbplan.spec.objectives import BalanceTask, ManipulabilityTask
+from wbplan.spec.script import Phase, unknown
+from wbplan.spec.tasks import ComTask, DampingTask, PostureTask, check_kind
 from wbplan.state import State, find_frame
 from wbplan.statics import support
-from wbplan.tasks import ComTask, DampingTask, PostureTask, check_kind
 
 Array = NDArray[np.float64]
 WORLD = -1
@@ -99,7 +99,7 @@ class CompiledPhase:
             in one plane and nothing pushes.
         ascents: manipulability tasks.
         contact_points: (C, 3) [m], world.
-        acceleration, braking, led, jerk: (n,) of all joints, see `wbplan.acceleration`; no jerk is None.
+        acceleration, braking, led, jerk: (n,) of all joints, see `acceleration`; no jerk is None.
         standing: bodies that stand in the world and are not carried, each with its pose.
     """
 

@@ -8,7 +8,7 @@ from typing import final
 
 import numpy as np
 
-from wbplan.compiled import CompiledPhase
+from wbplan.compiled.phase import CompiledPhase
 
 
 @final

@@ -1,0 +1,1 @@
+"""What held a task back in a tick, and what letting go would give."""

@@ -1,0 +1,1 @@
+"""A plan as pictures; they know its files and not how it was made."""
