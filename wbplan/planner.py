@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.compiled.acceleration import acceleration_bounds, braking_bounds
+from wbplan.compiled.acceleration import acceleration_bounds, braking_bounds, braking_kind
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.why import Why
@@ -259,9 +259,19 @@ def _interrupts_held() -> Iterator[None]:
 
 def _least_braking(robot: Robot, phases: Sequence[Phase], q: Array) -> Array:
     """(n,) what each joint can count on for braking in all of these phases [rad/s^2, m/s^2]."""
-    found = [braking_bounds(robot, phase, acceleration_bounds(robot, phase, q)) for phase in phases]
+    kinds: list[tuple[object, ...]] = []
+    alike = [phase for phase in phases if not _seen(braking_kind(phase), kinds)]
+    found = [braking_bounds(robot, phase, acceleration_bounds(robot, phase, q)) for phase in alike]
     least: Array = np.min(found, axis=0)
     return least
+
+
+def _seen(kind: tuple[object, ...], kinds: list[tuple[object, ...]]) -> bool:
+    """Whether a kind is among those seen before; it is from now on."""
+    if kind in kinds:
+        return True
+    kinds.append(kind)
+    return False
 
 
 def _inside_limits(robot: Robot, q: Array) -> None:

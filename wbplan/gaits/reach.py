@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: Moments looked at in a step.
 MOMENTS = 7
+#: Heights of the body that are tried, of the stance's own.
+HEIGHTS = np.arange(0.8, 1.31, 0.05)
 
 
 @final
@@ -151,7 +153,7 @@ def roomiest(walker: Walker, stance: Stance, lift: float, heading: float | None 
         heading: of the stroke in the body [rad]; of any where not given.
     """
     best, most = stance, 0.0
-    for height in stance.height * np.arange(0.8, 1.31, 0.05):
+    for height in stance.height * HEIGHTS:
         tried = Stance(stance.feet, float(height))
         stroke = room(walker, tried, lift, heading, most)
         if stroke > most:
@@ -196,14 +198,18 @@ def comfortable(
 
 
 def _hindered(walker: Walker, stance: Stance, lift: float, heading: float | None) -> str:
-    """Why the first leg that has no room in the stance has none."""
+    """Why the first leg without room has none, at the height at which fewest legs have none."""
     ahead = 1e-3 * np.array([np.cos(heading or 0.0), np.sin(heading or 0.0), 0.0])
-    for leg, foot in stance.feet.items():
-        place = np.array([*foot, -stance.height])
-        for there in (place, place + np.array([0.0, 0.0, lift]), place - ahead, place + ahead):
-            if leg in walker.closed and not (found := walker.closed[leg].solve(there)).within:
-                return f"'{leg}', {found.reason}"
-    return "there is less than a millimetre of room"
+    up = np.array([0.0, 0.0, lift])
+    reasons = []
+    for height in stance.height * HEIGHTS:
+        here = []
+        for leg, form in walker.closed.items():
+            foot = np.array([*stance.feet[leg], -height])
+            found = [form.solve(place) for place in (foot, foot + up, foot - ahead, foot + ahead)]
+            here += [f"'{leg}', {each.reason}" for each in found if not each.within][:1]
+        reasons.append(here or ["there is less than a few millimetres of room"])
+    return min(reasons, key=len)[0]
 
 
 def shares(walker: Walker, stance: Stance, heading: float) -> dict[str, Array]:
