@@ -18,8 +18,7 @@ import pinocchio as pin
 import wbplan as wb
 
 ROBOT = "mana"
-CLEARANCE = 0.005  # [m], of all but the feet from the ground
-BESIDE = 0.0049  # [m], between links: at 50 mm the helix leaves 4.966 mm between the body's plate and a thigh
+CLEARANCE = 0.005  # [m], between links, and of all but the feet from the ground
 BALL = 0.0075  # [m], radius of the feet's balls, whose centres are the feet's frames
 
 
@@ -65,7 +64,7 @@ def script(
             limits=[
                 wb.JointLimits(),
                 wb.SupportPolygon(margin=margin),
-                wb.SelfCollision(BESIDE),
+                wb.SelfCollision(CLEARANCE),
                 wb.Obstacles([ground], CLEARANCE),
             ],
             duration=seconds,

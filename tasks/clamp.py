@@ -33,19 +33,7 @@ TALL = 0.29  # body height [m] for stepping: lower down, the shanks' limit leave
 STEP = 0.03  # how high feet rise [m]
 CLEARANCE = 0.005  # [m], of all that is not meant to touch
 INFLUENCE = 0.02  # [m], within which things are held apart; further ones are not reached in a tick
-# An arm that is folded lies in its own shank, as it is built: there its links are 2 to 4 mm apart, and its
-# jaws pass the knee at 4.9 mm.
-FOLDED = tuple(
-    (f"{limb}_{one}", f"{limb}_{other}")
-    for limb in ARMS
-    for one, other in (
-        ("arm1", "slide"),
-        ("arm2", "slide"),
-        ("arm2", "shank1"),
-        ("jaw_a", "thigh"),
-        ("jaw_b", "thigh"),
-    )
-)
+ACROSS = np.radians(100.0)  # joint 4 with arm 1 across the shank: there the foot can pass behind it
 PALMS = tuple((f"{limb}_{link}", "box") for limb in ARMS for link in ("arm2", "jaw_a", "jaw_b"))
 HIGH = 0.32  # body height [m] aimed at while four legs carry: the taller, the less their hips' servos hold
 
@@ -91,7 +79,7 @@ def script(
         return [
             wb.JointLimits(speed=0.8),
             wb.SupportPolygon(margin=margin),
-            wb.SelfCollision(CLEARANCE, INFLUENCE, except_for=FOLDED),
+            wb.SelfCollision(CLEARANCE, INFLUENCE),
             wb.Obstacles([ground], CLEARANCE, INFLUENCE, except_for=tuple(touching)),
         ]
 
@@ -177,14 +165,14 @@ def script(
     )
     shoulder, elbow, wrist = ("joint1", "joint2", "joint3"), ("joint4",), ("joint5",)
     folding = {
-        f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, 0.0, 0.8)
+        f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, value, 1.2)
         for limb in ARMS
-        for joint in ("joint5", "finger_a", "finger_b")
+        for joint, value in (("joint4", ACROSS), ("joint5", 0.0), ("finger_a", 0.0), ("finger_b", 0.0))
     }
     unfolding = {
         f"{limb}_{joint}": wb.MinJerk(wb.AS_IS, value, 1.6)
         for limb in ARMS
-        for joint, value in (("joint4", arms_out[f"{limb}_joint4"]), ("shank2", 0.0))
+        for joint, value in (("joint4", ACROSS), ("shank2", 0.0))
     }
     return wb.Script(
         # (a) six-legged stance; the body rises to give the feet room
@@ -192,7 +180,7 @@ def script(
         # (b) legs 3 and 6 step forward, the body moves over the four that will carry
         phase("b step forward", REAR_AND_ARMS, "leg", 1.5, hard=step_to(ahead, 1.5), soft=body(TALL, 1.5)),
         phase("b shift", SIX, "leg", 0.8, soft=free_body(0.8)),
-        # (c) limbs 1 and 2 lift and become arms: elbow and shank first, then wrist and fingers
+        # (c) limbs 1 and 2 lift and become arms: elbow half way and shank first, then all the rest
         phase("c lift", CARRIERS, "leg", 0.8, hard=feet_to(raised, 0.8), soft=free_body(0.8)),
         phase("c raise", CARRIERS, "leg", 1.2, soft=[arms(shoulder, 1.2), *free_body(1.2)]),
         phase(
@@ -205,7 +193,7 @@ def script(
         # (e) lift it, and take it along a path of six degrees of freedom
         carry("e lift", wb.MinJerk(wb.AS_IS, above, 2.0), 2.0, ["box"]),
         carry("e move", tour, 8.0),
-        # (f) put it down; arms back and folded: wrist and fingers first, then elbow and shank
+        # (f) put it down; arms back and folded, in the reverse order
         carry("f lower", wb.MinJerk(wb.AS_IS, box.pose, 2.0), 2.2, ["box"]),
         phase("f release", CARRIERS, "arm", 1.0, PALMS, soft=[*palms(0.04, 1.0), *free_body(1.0)]),
         phase(
@@ -215,9 +203,9 @@ def script(
             "f close",
             CARRIERS,
             "arm",
-            0.8,
+            1.2,
             driven=folding,
-            soft=[arms((*shoulder, *elbow), 0.8), *free_body(0.8)],
+            soft=[arms(shoulder, 1.2), *free_body(1.2)],
         ),
         phase("f fold", CARRIERS, "leg", 1.6, soft=[arms(shoulder, 1.6), *free_body(1.6)]),
         # (g) limbs 1 and 2 return to the ground

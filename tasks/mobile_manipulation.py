@@ -25,13 +25,21 @@ ROBOT = "legarm_hexapod"
 ARM = "limb1"
 HAND = f"{ARM}_tip"
 PADS = (f"{ARM}_pad_a", f"{ARM}_pad_b")
+SPEED = 0.9  # share of the joints' speed limits
+CLEARANCE = 0.005  # [m], of all that is not meant to touch
+INFLUENCE = 0.02  # [m], within which things are held apart; further ones are not reached in a tick
+FINGERS = tuple((f"{ARM}_jaw_{letter}", "object") for letter in "ab")
 SIZE = (0.024, 0.008, 0.040)  # of the object [m]: along the gripper, across it, upright
 ABOVE = 0.03  # over its stand, from where the object is lowered [m]
 REACH = 0.030  # from the palm to the object's middle [m]
 GRAB = (150.0, -42.0, 35.0, 7.0, -20.0)  # joints 1 to 5 [degrees] that reach for it: arm and tool level
 AWAY = (110.0, -48.0, 38.0, 12.0, -20.0)  # likewise, turned away from what it has put down
 CLEAR = (120.0, -15.0, 50.0)  # joints 1 to 3 of the limb as a leg in the air
-ORDER = (("joint4", "shank2"), ("joint5", "finger_a", "finger_b"))  # else the arm would hit its own shank
+ACROSS = {f"{ARM}_joint4": math.radians(100.0)}  # arm 1 across the shank: the foot passes behind it
+ORDER = (
+    ("joint4", "shank2"),
+    ("joint4", "joint5", "finger_a", "finger_b"),
+)  # else it would hit its own shank
 TOUR = (  # joints 1 to 5 of the poses through which the object is carried
     (150.0, -45.0, 35.0, 22.0, -20.0),
     (152.0, -45.0, 35.0, 25.0, -22.0),
@@ -89,7 +97,16 @@ def script(
         tuple(tuple(f"{ARM}_{joint}" for joint in group) for group in ORDER),
         _joints(CLEAR),
         step_time,
+        via=ACROSS,
     )
+
+    def clear(*touching: tuple[str, str]) -> tuple[Any, ...]:
+        """The distances that are kept; what `touching` names may touch."""
+        ground = wb.Obstacle("ground", wb.Ground(), friction=friction)
+        return (
+            wb.SelfCollision(CLEARANCE, INFLUENCE),
+            wb.Obstacles([ground], CLEARANCE, INFLUENCE, except_for=touching),
+        )
 
     def body(k: int, share: float = 0.0) -> Any:
         """The body's nominal pose in step k."""
@@ -122,22 +139,29 @@ def script(
         "carried": [wb.Carried(thing, by=HAND, pads=PADS, squeeze=grip)],
         "driven": {f"{ARM}_finger_{letter}": shut for letter in "ab"},
     }
+    grasping = {"limits": (wb.JointLimits(speed=SPEED), wb.SupportPolygon(margin=margin), *clear(*FINGERS))}
     acts[near] = reach(near, wb.MinJerk(wb.AS_IS, grasp * before, step_time))
     acts[near + 1] = reach(near + 1, wb.MinJerk(wb.AS_IS, grasp, step_time))
-    acts[takes] = reach(takes, wb.Hold(grasp), driven=fingers(shut, 0.5 * step_time))
+    acts[takes] = reach(takes, wb.Hold(grasp), driven=fingers(shut, 0.5 * step_time), **grasping)
     acts[takes + 1] = reach(takes + 1, wb.MinJerk(wb.AS_IS, up * grasp, step_time), **held)
     for k, pose in enumerate(TOUR, start=takes + 2):
         goal = wb.MinJerk(wb.AS_IS, _hand(robot, pose), step_time)
         acts[k] = reach(k, wb.gaits.WithBody(made.course, made.steps[k].begin, goal, height), **held)
     acts[puts] = reach(puts, wb.MinJerk(wb.AS_IS, up * place, step_time), **held)
     acts[puts + 1] = reach(puts + 1, wb.MinJerk(wb.AS_IS, place, step_time), **held)
-    acts[puts + 2] = reach(puts + 2, wb.Hold(place), driven=fingers(wide, 0.7 * step_time))
+    acts[puts + 2] = reach(puts + 2, wb.Hold(place), driven=fingers(wide, 0.7 * step_time), **grasping)
     acts[puts + 3] = reach(puts + 3, wb.MinJerk(wb.AS_IS, place * before, step_time))
     acts |= {puts + 4 + k: fields for k, fields in enumerate(back)}
     acts |= {k: {"soft": (folding.posture(_joints(CLEAR)),)} for k in range(puts + 4 + len(back), lands - 1)}
     acts[lands - 1] = folding.lowered(made.steps[lands].swing[ARM][1], body(lands - 1, 1.0))
     manner = wb.gaits.Manner(
-        step_time=step_time, height=0.01, margin=margin, friction=friction, speed=0.9, settle=0.5
+        step_time=step_time,
+        height=0.01,
+        margin=margin,
+        friction=friction,
+        speed=SPEED,
+        settle=0.5,
+        limits=clear(),
     )
     walk = wb.gaits.perform(switch, made, manner, acts)
     return wb.Script(walk.phases, bodies=[thing], start=walk.start)

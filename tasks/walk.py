@@ -11,7 +11,7 @@ symmetrical hexapod robot with leg-arm integration", 2022 (gaits on five legs).
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -38,6 +38,7 @@ def script(
     radius: float | None = None,
     margin: float | None = None,
     closing: float = wb.gaits.CLOSING,
+    clearance: float = 0.005,
     friction: float = 0.7,
     terrain: Literal["flat", "rolling"] = "flat",
     relief: float | None = None,
@@ -63,6 +64,8 @@ def script(
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
         margin: stability margin kept throughout [m]; half of the largest where not given, or a quarter.
         closing: share by which five feet close the gap of the sixth; at 1 they are a regular pentagon.
+        clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do
+            robots without collision shapes.
         friction: of the feet on the ground [-].
         terrain: 'rolling' is a height field of hills and hollows, a few feet apart.
         relief: of their tops over the mean height [m]; a twentieth of the body's height where not given.
@@ -86,9 +89,9 @@ def script(
     shape = (
         wb.Ground() if terrain == "flat" else _rolling(stance.radius, length, relief or 0.05 * stance.height)
     )
-    obstacles = wb.Obstacles([wb.Obstacle("ground", shape, friction=friction)])
-    # Of other robots it is not known here where their soles are and which of their links lie close by design.
-    apart = (wb.SelfCollision(), obstacles) if robot.name == ROBOT else ()
+    ground = wb.Obstacle("ground", shape, (0.0, 0.0, -walker.sole), friction=friction)
+    obstacles = wb.Obstacles([ground], clearance)
+    apart: tuple[Any, ...] = (wb.SelfCollision(clearance), obstacles) if clearance > 0.0 else ()
     if terrain != "flat" and not apart:
         apart = (obstacles,)
     manner = wb.gaits.Manner(
@@ -96,10 +99,10 @@ def script(
         height=rise,
         margin=margin,
         friction=friction,
-        limits=apart,
+        limits=apart if walker.solid else (),
     )
-    ground = wb.gaits.over(obstacles.terrain)
-    return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner, ground=ground).script
+    feet = wb.gaits.over(obstacles.terrain, -walker.sole, walker.sole)
+    return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner, ground=feet).script
 
 
 def _rolling(radius: float, length: float, relief: float) -> wb.HeightField:

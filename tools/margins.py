@@ -15,7 +15,7 @@ import wbplan as wb
 from wbplan.physics.figures import margin_figure
 from wbplan.taskfile import load_task
 
-STRIDES = (0.05, 0.06, 0.065, 0.07, 0.08, 0.10, 0.14, 0.18)  # [m]
+STRIDES = (0.046, 0.05, 0.053, 0.056, 0.06, 0.065, 0.08, 0.10)  # [m]
 
 
 def main(trials: int, picture: Path) -> None:

@@ -19,13 +19,12 @@ from wbplan.explain.why import Reason, Why
 from wbplan.obstacles import Box, Cylinder, Ground, HeightField, Mesh, Obstacle, Sphere, Terrain
 from wbplan.paths import AS_IS, Curve, Hold, Line, Live, MinJerk, Path, Swing, Waypoints
 from wbplan.planner import Plan, plan
-from wbplan.robot import Robot, load_robot
-from wbplan.spec.bodies import Body, Carried, Grip
-from wbplan.spec.contacts import Contact, Push
-from wbplan.spec.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
-from wbplan.spec.objectives import BalanceTask, ManipulabilityTask
-from wbplan.spec.script import Phase, Script
-from wbplan.spec.tasks import (
+from wbplan.problem.bodies import Body, Carried, Grip
+from wbplan.problem.contacts import Contact, Push
+from wbplan.problem.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.problem.objectives import BalanceTask, ManipulabilityTask
+from wbplan.problem.script import Phase, Script
+from wbplan.problem.tasks import (
     ComTask,
     DampingTask,
     OrientationTask,
@@ -35,6 +34,7 @@ from wbplan.spec.tasks import (
     RelativePoseTask,
     Task,
 )
+from wbplan.robot import Robot, load_robot
 from wbplan.state import State
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION as __version__

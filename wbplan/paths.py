@@ -44,6 +44,14 @@ class AsIs:
 
 AS_IS: Final = AsIs()
 
+#: Numbers beyond this, in any unit, count as infinite: squares and products of them have to be numbers too.
+LARGEST = 1e30
+
+
+def within_reckoning(numbers: Array) -> bool:
+    """Whether all are finite, and none beyond `LARGEST`."""
+    return bool((np.abs(numbers) <= LARGEST).all())
+
 
 def checked(value: object, what: str) -> Value:
     """A copy of a pose or array, or `AS_IS`; a `SpecError` where it is not finite or no rotation."""
@@ -51,15 +59,15 @@ def checked(value: object, what: str) -> Value:
         return value
     if isinstance(value, pin.SE3):
         matrix = np.asarray(value.homogeneous)
-        if not np.isfinite(matrix).all():
-            raise SpecError(f"{what}: the pose holds NaN or infinity:\n{matrix}")
+        if not within_reckoning(matrix):
+            raise SpecError(f"{what}: the pose holds NaN, infinity or more than {LARGEST:g}:\n{matrix}")
         _check_rotation(matrix[:3, :3], what)
         return pin.SE3(value)
     numbers = numeric(value)
     if numbers is None:
         raise SpecError(f"{what}: expected pin.SE3 or an array of numbers, got {value!r}")
-    if not np.isfinite(numbers).all():
-        raise SpecError(f"{what}: NaN or infinite value in {numbers}")
+    if not within_reckoning(numbers):
+        raise SpecError(f"{what}: NaN, infinite value or more than {LARGEST:g} in {numbers}")
     if numbers.shape == (3, 3):
         _check_rotation(numbers, what)
     numbers.setflags(write=False)
@@ -97,7 +105,7 @@ def number(
     """A finite number, `least` or more and more than `above`; refused with a `SpecError` if it is not."""
     scalar = numeric(value)
     found = float(scalar) if scalar is not None and scalar.shape == () else np.nan
-    if not (np.isfinite(found) and found >= least and found > above):
+    if not (abs(found) <= LARGEST and found >= least and found > above):
         raise SpecError(
             f"{what}: expected {expected}, got {repr(value) if isinstance(value, str) else value}"
         )
@@ -107,7 +115,7 @@ def number(
 def vector(value: object, size: int, what: str) -> Array:
     """A copy of `size` finite numbers; refused with a `SpecError` if it is not that."""
     found = numeric(value)
-    if found is None or found.shape != (size,) or not np.isfinite(found).all():
+    if found is None or found.shape != (size,) or not within_reckoning(found):
         got = value if found is None else f"shape {found.shape}" if found.shape != (size,) else found
         raise SpecError(f"{what}: expected {size} finite numbers, got {got!s:.80}")
     return np.array(found, dtype=np.float64)

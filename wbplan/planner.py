@@ -22,13 +22,12 @@ from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.why import Why
 from wbplan.fallback import Retries
-from wbplan.paths import number
+from wbplan.problem.script import Phase, Script
 from wbplan.reasons import why_at
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
-from wbplan.spec.script import Phase, Script
 from wbplan.state import State
-from wbplan.tick import Loop
+from wbplan.tick import Loop, tick_length
 
 if TYPE_CHECKING:
     from wbplan.physics import Simulation
@@ -166,7 +165,7 @@ def plan(
             `partial` is the plan until then.
     """
     script = script if isinstance(script, Script) else Script(script)
-    dt = number(dt, "dt", "a finite positive time in seconds", above=0.0)
+    dt = tick_length(dt)
     start = script.start if start is None else start
     state = start if isinstance(start, State) else robot.state(start)
     if list(state.model.names) != list(robot.model.names):  # its q may be of the same size

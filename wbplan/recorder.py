@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from wbplan.bundle import SCHEMA, Bundle, Trajectory
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.obstacles import to_record
+from wbplan.problem.script import Phase, Script
 from wbplan.reasons import Notes
 from wbplan.robot import Robot
-from wbplan.spec.script import Phase, Script
 from wbplan.statics import Stance, plan_forces, promised
 from wbplan.tick import Loop, Tick
 from wbplan.version import VERSION

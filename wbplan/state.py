@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.errors import SpecError, listing
+from wbplan.paths import LARGEST
 
 QUATERNION_TOLERANCE = 1e-6
 """How far a quaternion's norm may be from 1 to be taken for a rounding error and renormalised."""
@@ -164,7 +165,7 @@ def _checked(model: pin.Model, q: ArrayLike) -> NDArray[np.float64]:
             f"q of robot '{model.name}': shape {own.shape}, expected ({model.nq},), "
             "x y z qx qy qz qw and then the joints"
         )
-    wrong = np.flatnonzero(~np.isfinite(own))
+    wrong = np.flatnonzero(~(np.abs(own) <= LARGEST))
     if wrong.size:
         raise SpecError(f"q[{wrong[0]}] of robot '{model.name}' is {own[wrong[0]]}, expected a finite number")
     if pin.isNormalized(model, own, 1e-12):

@@ -21,8 +21,8 @@ from typing import Any, Literal, Union, final, get_args, get_origin
 
 from wbplan import catalog
 from wbplan.errors import SpecError, WbplanError, listing
+from wbplan.problem.script import Script
 from wbplan.robot.reading import is_file, is_folder
-from wbplan.spec.script import Script
 
 _SUPPORTED = "float, int, bool, str, tuple of these, Literal[...], or one of these | None"
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")

@@ -27,20 +27,28 @@ from wbplan.explain.active import Active, HeldBack
 from wbplan.explain.replay import Replay
 from wbplan.explain.why import Why, keep_goals
 from wbplan.paths import number, vector
+from wbplan.problem.bodies import Body
+from wbplan.problem.script import Phase
 from wbplan.program.diagnose import solve_error
 from wbplan.program.qp import Solution
 from wbplan.program.retract import DRIFT, Retraction
 from wbplan.program.stack import Stack
 from wbplan.robot import Robot
 from wbplan.sampling import sample
-from wbplan.spec.bodies import Body
-from wbplan.spec.script import Phase
 from wbplan.state import State
 
 Array = NDArray[np.float64]
 
 #: A hard row further off than this [m or rad] after all correction breaks its promise; the checks allow 1e-4.
 PROMISE = 5e-5
+
+#: Least length of a tick [s]; powers of shorter ones vanish.
+SHORTEST = 1e-6
+
+
+def tick_length(dt: object) -> float:
+    """The length of a tick [s], or a `SpecError`."""
+    return number(dt, "dt", f"a finite positive time in seconds, {SHORTEST:g} or more", least=SHORTEST)
 
 
 @final
@@ -89,6 +97,9 @@ class Tick:
         asked = loop.compiled.phase.clearance
         if asked is not None and self.clearance < asked - 1e-6:
             self.warning += f"{'; ' if self.warning else ''}clearance not yet reached: {self.clearance:.4f} m"
+        if loop.too_fast:
+            joints = ", ".join(loop.too_fast)
+            self.warning += f"{'; ' if self.warning else ''}speed not yet within its limit: {joints}"
         self.microseconds = 1e6 * (time.perf_counter() - started)
 
     @cached_property
@@ -145,6 +156,7 @@ class Loop:
     Attributes:
         velocity: (nv,) of the last step [m/s, rad/s].
         last: the last tick made; None before the first.
+        too_fast: joints that came into the phase faster than its limits let them go, and still slow down.
 
     Raises:
         SpecError: the phase does not fit the robot, or not how it moves when the phase begins.
@@ -165,7 +177,7 @@ class Loop:
         rest_at: float | None = None,
         braking: Array | None = None,
     ) -> None:
-        self.dt, self.t = number(dt, "dt", "a finite positive time in seconds", above=0.0), 0.0
+        self.dt, self.t = tick_length(dt), 0.0
         if isinstance(state, State) and list(state.model.names) != list(robot.model.names):
             raise SpecError(f"state: one of '{state.model.name}', expected one of '{robot.name}'")
         start = State(robot.model, state.q if isinstance(state, State) else state)
@@ -187,9 +199,15 @@ class Loop:
         self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
         joints = self.compiled.free[6:]
         self.stack.begin(self.velocity * self.dt)
+        self.too_fast = self._faster_than_limits()
         check_given(self.compiled, self.velocity, self.dt)
         if braking is not None:
             self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
+
+    def _faster_than_limits(self) -> tuple[str, ...]:
+        box, names = self.stack.box, self.compiled.robot.joint_names
+        fast = np.flatnonzero(np.abs(box.previous) > box.reach * (1.0 + 1e-6))
+        return tuple(names[self.compiled.free[6 + k] - 6] for k in fast)
 
     @property
     def backend(self) -> str:
@@ -283,6 +301,8 @@ class Loop:
         held_back = HeldBack(stack, solution)
         self.velocity = taken / self.dt
         stack.box.took(taken[stack.free], stack.kinematics.com - com)
+        if self.too_fast:
+            self.too_fast = self._faster_than_limits()
         self.last = Tick(self, self.velocity, held_back, replay, started)
         return self.last
 

@@ -106,6 +106,8 @@ def test_an_arm_that_is_no_leg_is_refused(walker: gaits.Walker) -> None:
         ({"clear": {"leg3_joint1": 0.0}}, r"leg3_joint1 is no joint of limb1"),
         ({"order": (("limb1_joint4", "limb1_joint2"),)}, r"where limb1_joint2 goes"),
         ({"step_time": 0.0}, r"Unfolding\.step_time"),
+        ({"via": {"limb1_joint4": 1.7}}, r"Unfolding\.via: expected a value for each joint that two groups"),
+        ({"order": (("limb1_joint4",),) * 2}, r"Unfolding\.via"),
     ],
 )
 def test_bad_unfoldings(walker: gaits.Walker, fields: dict[str, object], match: str) -> None:
@@ -134,3 +136,22 @@ def test_a_group_takes_the_steps_that_its_slowest_joint_needs(walker: gaits.Walk
         )
         assert len(folding.out(np.zeros(3))) == 2 + count
         assert len(folding.back()) == count
+
+
+def test_a_joint_may_wait_half_way(walker: gaits.Walker) -> None:
+    """It is at its value of `via` between two groups that name it, on the way out and on the way back."""
+    folding = gaits.Unfolding(
+        walker,
+        "limb1",
+        {"limb1_joint1": 2.5, "limb1_joint4": 0.1},
+        (("limb1_joint4", "limb1_shank2"), ("limb1_joint4",)),
+        {"limb1_joint2": 0.0},
+        1.6,
+        via={"limb1_joint4": 1.7},
+    )
+    first, last = folding.out(np.zeros(3))[2:]
+    assert first["driven"] == {"limb1_joint4": 1.7, "limb1_shank2": 0.0}
+    assert last["roles"] == {"limb1": "arm"}
+    back = folding.back()
+    assert back[0]["driven"] == {"limb1_joint4": 1.7, "limb1_shank2": 0.0}
+    assert back[1]["roles"] == {"limb1": "leg"}

@@ -20,7 +20,7 @@ LAYERS = [
     "catalog",
     "robot",
     "mechanism",
-    "spec",
+    "problem",
     "statics",
     "compiled",
     "collision",

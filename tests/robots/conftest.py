@@ -106,6 +106,12 @@ class Machine:
             if result.isCollision()
         }
 
+    def least(self, chosen: pin.GeometryModel, q: np.ndarray) -> float:
+        """Least distance [m] of all pairs."""
+        found = chosen.createData()
+        pin.computeDistances(self.model, self.model.createData(), chosen, found, q)
+        return min(result.min_distance for result in found.distanceResults)
+
     @cached_property
     def checked(self) -> pin.GeometryModel:
         """Collision shapes with the pairs of links that a planner would check."""

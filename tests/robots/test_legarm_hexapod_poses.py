@@ -124,13 +124,23 @@ def test_crossed_limbs_do_touch(legarm):
 
 
 def test_a_limb_changes_its_role_without_touching_itself(legarm):
-    # Joint 4 and shank 2 together, then joint 5 and the fingers: inside the channel the arm cannot turn.
+    # Joint 4 to 100 degrees and shank 2 together, then all the rest: inside the channel the arm cannot turn,
+    # and the foot passes only behind an arm that stands across.
     active = legarm.solids_with(set(legarm.disabled()), keep=False)
     leg, arm = legarm.states("all")["stand"], legarm.states("all")["manipulate"]
     for s in np.linspace(0.0, 1.0, 81):
         values = dict(arm)
         for limb in ARMS:
-            for joint in ("joint4", "shank2", "joint5", "finger_a", "finger_b"):
-                name, late = f"{limb}_{joint}", joint not in ("joint4", "shank2")
+            name = f"{limb}_joint4"
+            values[name] = np.interp(2.0 * s, [0.0, 1.0, 2.0], [leg[name], np.radians(100.0), arm[name]])
+            for joint in ("shank2", "joint5", "finger_a", "finger_b"):
+                name, late = f"{limb}_{joint}", joint != "shank2"
                 values[name] = leg[name] + float(np.clip(2 * s - late, 0, 1)) * (arm[name] - leg[name])
-        assert legarm.hits(active, legarm.q(values)) == set(), f"at {s:.2f}"
+        assert legarm.least(active, legarm.q(values)) > 0.0054, f"at {s:.2f}"
+
+
+def test_a_folded_limb_keeps_five_millimetres_however_the_knee_bends(legarm):
+    active = legarm.solids_with(set(legarm.disabled()), keep=False)
+    for knee in np.radians(np.linspace(-30.0, 60.0, 31)):
+        values = legarm.states("all")["stand"] | {f"{limb}_joint3": knee for limb in ARMS}
+        assert legarm.least(active, legarm.q(values)) > 0.0054

@@ -24,7 +24,7 @@ def main() -> int:
 
         print(run_episode(asked.seed, asked.episode))
         return 0
-    report = soak(asked.ticks, seed=asked.seed, workers=asked.workers, show=sys.stderr.isatty())
+    report = soak(asked.ticks, seed=asked.seed, workers=asked.workers, out=sys.stderr)
     print(report.table())
     return 0 if report.clean else 1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import time
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,7 @@ from soak_watch import Watch
 import wbplan as wb
 
 LONGEST = 400  #: ticks of one phase
+ENDLESS = 5.0  #: [s] of the processor's time, that a tick may take; the first ones compile
 REFUSALS = 3  #: in a row, then the phase is given up
 
 
@@ -27,14 +29,19 @@ class Outcome:
         counts: "ticks proxqp", "refused: ...", "warned" ... -> how often.
         worst: promise -> largest share of its bound that was used.
         found: what should not have happened.
+        slowest: longest time of a tick that was made or refused [s].
     """
 
     counts: Counter[str] = field(default_factory=Counter)
     worst: dict[str, float] = field(default_factory=dict)
     found: list[str] = field(default_factory=list)
+    slowest: float = 0.0
 
-    def add(self, counts: dict[str, int], worst: dict[str, float], found: list[str]) -> None:
+    def add(
+        self, counts: dict[str, int], worst: dict[str, float], found: list[str], slowest: float = 0.0
+    ) -> None:
         self.counts.update(counts)
+        self.slowest = max(self.slowest, slowest)
         for promise, share in worst.items():
             self.worst[promise] = max(share, self.worst.get(promise, -np.inf))
         self.found += found
@@ -89,6 +96,7 @@ def _run_phase(
             if rng.random() < 0.05:
                 jump(rng, live, far)
         q, t = loop.q.copy(), loop.t
+        began = time.process_time()
         try:
             tick = loop.step()
         except wb.WbplanError as error:
@@ -99,6 +107,11 @@ def _run_phase(
             if refused >= REFUSALS:
                 return
             continue
+        finally:
+            took = time.process_time() - began
+            out.slowest = max(out.slowest, took)
+            if took > ENDLESS:
+                out.found.append(f"a tick took {took:.1f} s ({backend}, {loop.compiled.robot.name})")
         refused = 0
         out.counts[f"ticks {backend}"] += 1
         if tick.warning:

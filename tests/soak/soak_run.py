@@ -1,4 +1,7 @@
-"""Episodes shared out to processes; one that dies is a finding, and the next goes on after its episode."""
+"""Episodes shared out to processes; one that dies is a finding, and the next goes on after its episode.
+
+A line every minute says how far it is, and every finding is said as it comes.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,14 @@ import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 from soak_episode import Outcome
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 PATIENCE = 300.0  #: [s], an episode that takes longer hangs
+EVERY = 60.0  #: [s] between two lines that say how far it is
 FLAT = 60.0  #: [MB], that a process may grow by over the second half of its episodes
 
 
@@ -46,6 +51,7 @@ class Report:
     def table(self) -> str:
         lines = [f"{self.total.ticks} ticks in {self.episodes} episodes, {self.seconds:.0f} s"]
         lines += [f"  {n:>9} {name}" for name, n in sorted(self.total.counts.items())]
+        lines.append(f"slowest tick: {self.total.slowest:.3f} s")
         lines.append("promises, the largest share of each bound that was used:")
         lines += [f"  {share:>9.3f} {promise}" for promise, share in sorted(self.total.worst.items())]
         peaks = ", ".join(f"{m[len(m) // 2]:.0f} to {m[-1]:.0f}" for m in self.memory if m)
@@ -55,9 +61,37 @@ class Report:
         return "\n".join(lines)
 
 
-def soak(ticks: int, *, seed: int = 0, workers: int = 1, show: bool = False) -> Report:
-    """Run at least as many ticks."""
+class Progress:
+    """Says how far a run is: to a terminal in one line that changes, elsewhere in a line every minute."""
+
+    def __init__(self, ticks: int, out: TextIO) -> None:
+        self.ticks, self.out, self.terminal = ticks, out, out.isatty()
+        self.started = self.last = time.perf_counter()
+
+    def __call__(self, report: Report) -> None:
+        now = time.perf_counter()
+        if now - self.last < (0.5 if self.terminal else EVERY):
+            return
+        self.last, done = now, report.total.ticks
+        rate = done / (now - self.started)
+        told = f"{done} of {self.ticks} ticks, {rate:.0f} a second, {len(report.found)} findings"
+        print(f"\r{told} " if self.terminal else told, end="" if self.terminal else "\n", file=self.out)
+        self.out.flush()
+
+    def found(self, number: int, what: str) -> None:
+        line_ends = "\n" if self.terminal else ""
+        print(f"{line_ends}FOUND episode {number}: {what}", file=self.out, flush=True)
+
+
+def soak(ticks: int, *, seed: int = 0, workers: int = 1, out: TextIO | None = None) -> Report:
+    """Run at least as many ticks; `out` is told how far it is."""
     report, lock, started = Report(), threading.Lock(), time.perf_counter()
+    progress = None if out is None else Progress(ticks, out)
+
+    def finds(number: int, found: list[str]) -> None:
+        report.found += [(number, what) for what in found]
+        for what in found if progress else ():
+            progress.found(number, what)
 
     def serve(first: int) -> None:
         left, number = ticks // workers, first
@@ -81,18 +115,17 @@ def soak(ticks: int, *, seed: int = 0, workers: int = 1, show: bool = False) -> 
                     memory.append(said["rss"])
                     with lock:
                         before = report.total.ticks
-                        report.total.add(said["counts"], said["worst"], [])
-                        report.found += [(said["end"], what) for what in said["found"]]
+                        report.total.add(said["counts"], said["worst"], [], said["slowest"])
+                        finds(said["end"], said["found"])
                         report.episodes += 1
                         left -= max(report.total.ticks - before, 1)
-                        if show:
-                            told = f"\r{report.total.ticks} of {ticks}, {len(report.found)} findings"
-                            print(told, end="", file=sys.stderr)
+                        if progress:
+                            progress(report)
                 timer.cancel()
                 code = process.wait()
             if code:
                 with lock:
-                    report.found.append((number, f"the process ended with code {code}"))
+                    finds(number, [f"the process ended with code {code}"])
                 number, left = number + workers, left - 1
 
     threads = [threading.Thread(target=serve, args=(k,)) for k in range(workers)]

@@ -47,8 +47,7 @@ def main(seed: int, first: int, step: int, ticks: int) -> None:
         ticks -= max(outcome.ticks, 1)
         if number % 20 == first % 20:
             gc.collect()
-        told = {"counts": outcome.counts, "worst": outcome.worst, "found": outcome.found, "rss": resident()}
-        out.write(json.dumps({"end": number, **told}) + "\n")
+        out.write(json.dumps({"end": number, **vars(outcome), "rss": resident()}) + "\n")
         number += step
 
 

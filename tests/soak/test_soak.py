@@ -32,7 +32,9 @@ def _tick(state: wb.State, q: np.ndarray, dt: float, **more: object) -> SimpleNa
     import pinocchio as pin
 
     v = pin.difference(state.model, state.q, q) / dt
-    return SimpleNamespace(q=q, v=v, t=dt, com=wb.State(state.model, q).com, margin=np.nan, **more)
+    return SimpleNamespace(
+        q=q, v=v, t=dt, com=wb.State(state.model, q).com, margin=np.nan, warning="", **more
+    )
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ import wbplan as wb
 from wbplan import catalog
 from wbplan.cli.commands import main
 from wbplan.cli.survey import setting
-from wbplan.gaits import Manner, gaits_for, straight, walk
+from wbplan.gaits import Manner, Walker, gaits_for, straight, walk
 from wbplan.taskfile import load_task
 
 TASK = load_task("walk")
@@ -24,6 +26,7 @@ def planned(robot: str, dt: float = 0.02, **settings: Any) -> wb.Plan:
     plan = wb.plan(loaded, TASK.script(loaded, values), dt=dt)
     report = plan.check()
     assert report.ok, [row for row in report.rows if not row.held]
+    assert all(phase["clearance"] == 0.005 for phase in plan.bundle.phases)
     return plan
 
 
@@ -85,6 +88,26 @@ def test_robots(robot: str) -> None:
     assert way[0] > 0.01
     assert way[1] == pytest.approx(0.0, abs=1e-3)
     assert np.nanmin(plan.trajectory.margin) > 0.0
+
+
+def test_the_ground_is_a_balls_radius_below_its_middle() -> None:
+    """Of a foot whose frame is the middle of its ball; feet that land sink no further in than ticks go."""
+    soles = {name: Walker(wb.load_robot(name)).sole for name in catalog.robots()}
+    assert soles == {**dict.fromkeys(soles, 0.0), "mana": 0.0075}
+    plan = planned("mana", dt=0.01, cycles=0.5)
+    (ground,) = plan.bundle.obstacles
+    assert ground.pose.translation == pytest.approx([0.0, 0.0, -0.0075])
+    assert plan.check()["depth of touch"].worst > -1e-5
+
+
+def test_distances_are_left_out_where_nobody_asks(tmp_path: Path) -> None:
+    robot = wb.load_robot("mana")
+    script = TASK.script(robot, TASK.values(["clearance=0"]))
+    assert {phase.clearance for phase in script.phases} == {None}
+    bare = re.sub(r"<collision>.*?</collision>", "", robot.urdf_text, flags=re.DOTALL)
+    (tmp_path / "bare.urdf").write_text(bare)
+    shapeless = wb.load_robot(tmp_path / "bare.urdf", srdf=robot.srdf_path)
+    assert {phase.clearance for phase in TASK.script(shapeless, TASK.values([])).phases} == {None}
 
 
 @pytest.mark.parametrize("robot", ["hexpiderix", "hiphant"])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wbplan.errors import ModelError, ViewError
-from wbplan.spec.bodies import Body
+from wbplan.problem.bodies import Body
 from wbplan.view import Scene
 from wbplan.view.robot_meshes import robot_meshes
 

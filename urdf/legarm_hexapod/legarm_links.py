@@ -121,16 +121,16 @@ def shank1(limb: str, structure: float) -> Link:
     for face, end in ((outer, T.shank1 - 0.008), (inner, T.shank1 - 0.035)):
         low, high = sorted((face, face * (0.0245 / 0.022)))
         plates.append(block((-0.012, low, -0.014), (0.040, high, 0.014), solid=True))
-        plates.append(block((0.040, low, -0.014), (end, high, 0.021), solid=True))
+        plates.append(block((0.040, low, -0.014), (end, high, 0.0225), solid=True))
     low, high = sorted((outer, outer * (0.0245 / 0.022)))
     plates.append(block((T.shank1 - 0.008, low, -0.010), (T.shank1 + 0.010, high, 0.010), solid=True))
     low, high = sorted((side * 0.0245, side * (0.0245 + DRS_0101.size[2])))
     servo = housing(DRS_0101, (T.shank1, (low + high) / 2, 0.0), "x", "y")
     parts = [
         *plates,
-        block((0.040, -0.022, 0.0195), (0.125, 0.022, 0.0210), solid=True),
+        block((0.040, -0.022, 0.0210), (0.125, 0.022, 0.0225), solid=True),
         Part(servo.shape, servo.xyz, material="servo_black", mass=DRS_0101.mass, solid=True),
-        *(block((x, -0.008, 0.021), (x + 0.016, 0.008, 0.033), "blue", mass=0.0) for x in (0.056, 0.106)),
+        *(block((x, -0.008, 0.0225), (x + 0.016, 0.008, 0.0365), "blue", mass=0.0) for x in (0.056, 0.106)),
     ]
     return Link(f"{limb}_shank1", tuple(parts), structure)
 
@@ -138,7 +138,7 @@ def shank1(limb: str, structure: float) -> Link:
 def slide(limb: str, structure: float) -> Link:
     """Shank 2: a rail on the back of shank 1 and a neck down to the foot; its frame is where the foot is."""
     ball = (-T.foot, 0.0, 0.0)
-    elbow, tail = (-0.040, 0.0, 0.027), (-0.148, 0.0, 0.027)
+    elbow, tail = (-0.040, 0.0, 0.0305), (-0.148, 0.0, 0.0305)
     parts = [
         rod(tail, elbow, 0.005, "carbon", solid=True),
         Part(sphere(0.005), elbow, material="carbon"),
@@ -171,17 +171,17 @@ def arm2(limb: str, structure: float) -> Link:
         block((0.046, -0.012, -0.0155), (0.091, 0.012, 0.0155), "servo_black", mass=DRS_0101.mass),
     ]
     for low, high in ((0.0040, 0.0155), (-0.0155, -0.0040)):
-        parts.append(block((0.091, -0.018, low), (face - 0.006, 0.018, high), "blue"))
-        parts.append(block((face - 0.006, -0.018, low), (face, 0.018, high), "palm_rubber"))
+        parts.append(block((0.091, -0.0165, low), (face - 0.006, 0.0165, high), "blue"))
+        parts.append(block((face - 0.006, -0.0165, low), (face, 0.0165, high), "palm_rubber"))
     covers = (
         block((-0.008, -0.012, -0.0155), (0.091, 0.012, 0.0155)),
-        block((0.091, -0.018, -0.0155), (face, 0.018, 0.0155)),
+        block((0.091, -0.0165, -0.0155), (face, 0.0165, 0.0155)),
     )
     return Link(f"{limb}_arm2", tuple(parts), structure, covers)
 
 
 RUBBER = 0.0080  # a finger's rubber face beside the line from its hinge
-PAD = 0.0315  # the face's middle, from the hinge
+PAD = 0.0310  # the face's middle, from the hinge
 
 
 def jaw(limb: str, letter: str, structure: float) -> Link:

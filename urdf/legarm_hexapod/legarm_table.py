@@ -35,7 +35,7 @@ class Table:
     # Layout (assumed): limbs 1, 2 on either side of +y, then legs 3 to 6 clockwise, every 60 degrees
     azimuths: tuple[float, ...] = (120.0, 60.0, 0.0, -60.0, -120.0, 180.0)
     # Assumed
-    finger: float = 0.040  # beyond the palm: the folded arm must end before the knee's servo
+    finger: float = 0.039  # beyond the palm: the folded arm must end 5 mm before the knee's servo
     hinge: float = 0.009  # fingers' hinges behind the palm's face
     slide_effort: float = 60.0  # [N], shank 2
     slide_speed: float = 0.1  # [m/s]

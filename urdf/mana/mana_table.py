@@ -32,7 +32,7 @@ class Table:
     board: float = 0.060
     eyes: float = 0.030
     drive: float = 0.041  # hip 1 to the middle of its servo, along x: the hip swings in front of it
-    plate_x: float = 0.082  # half lengths of the body's plates
+    plate_x: float = 0.0815  # half lengths of the body's plates
     plate_y: float = 0.055
     plate: float = 0.003
     deck: float = 0.020  # middle of each plate above and below the body's centre

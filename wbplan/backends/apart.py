@@ -8,11 +8,10 @@ in the measure of the cost: with no other bound in the way, that is the solution
 from __future__ import annotations
 
 import numpy as np
-import proxsuite
 from numpy.typing import NDArray
 
+from wbplan.backends.exact import ExactSolver
 from wbplan.program.diagnose import solve_error
-from wbplan.program.joint_box import UNBOUNDED
 from wbplan.program.stack import Stack
 
 Array = NDArray[np.float64]
@@ -33,20 +32,9 @@ def keep_apart(stack: Stack, step: Array) -> Array:
     wanted = step[stack.free]
     if (stack.C @ wanted <= stack.d + ROUNDING).all():
         return step
-    for patient in (False, True):  # what is too near need not move apart, if it cannot
-        if patient:
-            stack.relax()
-        qp = proxsuite.proxqp.dense.QP(len(stack.g), len(stack.b), len(stack.d), True)
-        qp.settings.eps_abs = 1e-9
-        qp.settings.eps_primal_inf = qp.settings.eps_dual_inf = 1e-14
-        qp.settings.max_iter, qp.settings.max_iter_in = 200, 50
-        qp.init(
-            stack.H, -stack.H @ wanted, stack.A, stack.b, stack.C, np.full(len(stack.d), -UNBOUNDED), stack.d,
-            stack.lower, stack.upper,
-        )  # fmt: skip
-        qp.solve()
-        if qp.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
-            near = step.copy()
-            near[stack.free] = np.clip(qp.results.x, stack.lower, stack.upper)
-            return near
-    raise solve_error(stack, "no step near PlaCo's keeps the clearance")
+    found = ExactSolver(stack).step(-stack.H @ wanted)
+    if found is None:
+        raise solve_error(stack, "no step near PlaCo's keeps the clearance")
+    near = step.copy()
+    near[stack.free] = np.clip(found[0], stack.lower, stack.upper)
+    return near

@@ -19,13 +19,14 @@ from __future__ import annotations
 
 from typing import Any, final
 
+import daqp
 import numpy as np
-import proxsuite
 from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from wbplan.backends.curvature import Curvature
+from wbplan.backends.exact import MOST, OPTIMAL
 from wbplan.backends.kkt import ROUNDING
 from wbplan.program.levels import Level
 from wbplan.program.nullspace import null_basis
@@ -275,13 +276,13 @@ class Cascade:
         return None
 
     def _ask_solver(self, k: int, gz: Array, Hz: Array, G: Array) -> tuple[Array, Array]:
-        """By ProxQP; where even that has no answer, the level does not move."""
-        qp = proxsuite.proxqp.dense.QP(len(gz), 0, len(G))
-        qp.settings.eps_abs, qp.settings.eps_rel, qp.settings.max_iter = 1e-9, 0.0, 1000
-        qp.init(Hz, gz, None, None, G, self._low, self._high)
-        qp.solve()
-        if qp.results.info.status != proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
+        """By daqp; where even that has no answer, the level does not move."""
+        z, _, flag, info = daqp.solve(
+            Hz.copy(), gz.copy(), G.copy(), self._high.copy(), self._low.copy(),
+            np.zeros(len(G), dtype=np.int32), primal_tol=1e-9, iter_limit=MOST,
+        )  # fmt: skip
+        z, force = np.asarray(z, dtype=np.float64), np.asarray(info["lam"], dtype=np.float64).copy()
+        if flag != OPTIMAL or not (np.isfinite(z).all() and np.isfinite(force).all()):
             return np.zeros(len(gz)), np.zeros(len(G))
-        force = np.array(qp.results.z)
         np.sign(np.where(np.abs(force) > ROUNDING, force, 0.0), out=self._sides[k], casting="unsafe")
-        return np.array(qp.results.x), force
+        return z, force

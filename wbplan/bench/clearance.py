@@ -9,7 +9,7 @@ import numpy as np
 from wbplan.bench.race import COLD
 from wbplan.bench.scenes import Scene
 from wbplan.obstacles import Ground, Obstacle
-from wbplan.spec.limits import Obstacles, SelfCollision
+from wbplan.problem.limits import Obstacles, SelfCollision
 from wbplan.tick import Loop
 
 #: Ticks in a row before the other one has its turn.

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from wbplan.compiled.phase import CompiledPhase, compile_phase
 from wbplan.paths import Path, Waypoints
+from wbplan.problem.bodies import Body, Carried
+from wbplan.problem.contacts import Contact
+from wbplan.problem.limits import JointLimits, SupportPolygon
+from wbplan.problem.script import Phase
+from wbplan.problem.tasks import PoseTask, PostureTask, RelativePoseTask, Task
 from wbplan.robot import Robot, load_robot
-from wbplan.spec.bodies import Body, Carried
-from wbplan.spec.contacts import Contact
-from wbplan.spec.limits import JointLimits, SupportPolygon
-from wbplan.spec.script import Phase
-from wbplan.spec.tasks import PoseTask, PostureTask, RelativePoseTask, Task
 from wbplan.state import State
 
 Array = NDArray[np.float64]

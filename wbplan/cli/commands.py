@@ -31,8 +31,8 @@ from wbplan.papers import DIFFERS, report, summary
 from wbplan.physics import ghost_of
 from wbplan.physics import simulate as replay
 from wbplan.planner import plan
+from wbplan.problem.script import Script
 from wbplan.robot import Robot, load_robot
-from wbplan.spec.script import Script
 from wbplan.taskfile import glance, load_task
 from wbplan.tick import Loop
 from wbplan.version import VERSION

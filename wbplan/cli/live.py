@@ -9,8 +9,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan import reasons
+from wbplan.problem.script import Script
 from wbplan.robot import Robot
-from wbplan.spec.script import Script
 from wbplan.tick import Loop
 from wbplan.view import Scene, Server
 

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
 from wbplan.obstacles import Box, Cylinder, HeightField, Mesh, Obstacle, Sphere
+from wbplan.problem.limits import SelfCollision
 from wbplan.robot import Robot
-from wbplan.spec.limits import SelfCollision
 from wbplan.state import find_frame
 
 Array = NDArray[np.float64]
@@ -41,6 +41,9 @@ TOUCH = 0.005
 
 #: A shape that reaches this near [m] to the frame of a foot whose link has no shape is the foot's.
 NEAR = 0.01
+
+#: A ball whose centre is this near [m] to a foot's frame is about it.
+CENTRED = 1e-4
 
 WORLD_JOINT = 0
 
@@ -113,6 +116,34 @@ def robot_shapes(robot: Robot) -> Any:
     Frames keep their numbers in a model with carried bodies, which come after them.
     """
     return pin.GeometryModel(_shapes_in_urdf(robot))
+
+
+def has_shapes(robot: Robot) -> bool:
+    """Whether any link has a collision shape."""
+    return ElementTree.fromstring(robot.urdf_text).find("link/collision/geometry") is not None
+
+
+def sole(robot: Robot, foot: str) -> float:
+    """How far below a foot's frame the ground is while the foot stands, however its link leans [m].
+
+    That is the radius of a ball whose centre is the frame, and 0 of feet whose frame is on their surface.
+
+    Args:
+        robot: with collision shapes.
+        foot: frame of the foot.
+
+    Raises:
+        SpecError: no link has a shape, or there is no such frame.
+    """
+    frame = robot.model.frames[find_frame(robot.model, foot)]
+    radii = [
+        float(item.geometry.radius)
+        for item in _shapes_in_urdf(robot).geometryObjects
+        if item.parentJoint == frame.parentJoint
+        and isinstance(item.geometry, coal.Sphere)
+        and np.linalg.norm(item.placement.translation - frame.placement.translation) < CENTRED
+    ]
+    return max(radii, default=0.0)
 
 
 def collision_model(compiled: CompiledPhase) -> CollisionModel:

@@ -30,10 +30,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbplan.problem.bodies import frame_number
+from wbplan.problem.script import Phase, unknown
+from wbplan.problem.tasks import FrameTask
 from wbplan.robot import Robot
-from wbplan.spec.bodies import frame_number
-from wbplan.spec.script import Phase, unknown
-from wbplan.spec.tasks import FrameTask
 from wbplan.state import find_frame
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
 from wbplan.paths import POINT, Path
-from wbplan.spec.bodies import frame_number
-from wbplan.spec.objectives import KINDS, BalanceTask, ManipulabilityTask
-from wbplan.spec.script import Phase
+from wbplan.problem.bodies import frame_number
+from wbplan.problem.objectives import KINDS, BalanceTask, ManipulabilityTask
+from wbplan.problem.script import Phase
 from wbplan.state import State
 
 Array = NDArray[np.float64]

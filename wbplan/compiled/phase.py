@@ -17,11 +17,11 @@ from wbplan.compiled.aims import AscentTarget, ComTarget, ascent_target, balance
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
 from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
+from wbplan.problem.bodies import Body, Held, frame_number, standing, with_carried
+from wbplan.problem.objectives import BalanceTask, ManipulabilityTask
+from wbplan.problem.script import Phase, unknown
+from wbplan.problem.tasks import ComTask, DampingTask, PostureTask, check_kind
 from wbplan.robot import Robot
-from wbplan.spec.bodies import Body, Held, frame_number, standing, with_carried
-from wbplan.spec.objectives import BalanceTask, ManipulabilityTask
-from wbplan.spec.script import Phase, unknown
-from wbplan.spec.tasks import ComTask, DampingTask, PostureTask, check_kind
 from wbplan.state import State, find_frame
 from wbplan.statics import support
 

@@ -20,11 +20,11 @@ from wbplan.gaits.stance import Stance, Walker
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.geometry import support_polygon
 from wbplan.paths import number
+from wbplan.problem.contacts import Contact
+from wbplan.problem.limits import JointLimits, SupportPolygon
+from wbplan.problem.script import Phase, Script
+from wbplan.problem.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 from wbplan.robot import Robot
-from wbplan.spec.contacts import Contact
-from wbplan.spec.limits import JointLimits, SupportPolygon
-from wbplan.spec.script import Phase, Script
-from wbplan.spec.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 from wbplan.state import State
 
 Array = NDArray[np.float64]

@@ -21,8 +21,8 @@ from wbplan.gaits.schedule import Course
 from wbplan.gaits.stance import Walker
 from wbplan.mechanism import FiveJointLimb, limb_chain
 from wbplan.paths import POSE, Hold, Path, Value, as_path, number
+from wbplan.problem.tasks import PoseTask, Task
 from wbplan.sampling import Samples, sample
-from wbplan.spec.tasks import PoseTask, Task
 
 Array = NDArray[np.float64]
 

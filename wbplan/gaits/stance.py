@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from wbplan.collision import has_shapes, sole
 from wbplan.errors import SpecError, listing
 from wbplan.mechanism import Platform, ThreeJointLeg
 from wbplan.paths import name_of, number
@@ -191,6 +192,18 @@ class Walker:
     def closed(self) -> Mapping[str, ThreeJointLeg]:
         """Closed forms of the legs, in the pose's roles."""
         return Platform.of_robot(self.robot, self.state, self.legs).legs
+
+    @cached_property
+    def solid(self) -> bool:
+        """Whether the robot has collision shapes, so that distances can be kept."""
+        return has_shapes(self.robot)
+
+    @cached_property
+    def sole(self) -> float:
+        """How far below the feet's frames the ground is [m]; see `collision.sole`."""
+        if not self.solid:
+            return 0.0
+        return max(sole(self.robot, self.robot.feet[leg]) for leg in self.legs)
 
     def foot(self, leg: str) -> Array:
         """A foot in the pose, against the body's origin (2,) [m]."""

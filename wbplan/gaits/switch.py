@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, final
 
@@ -24,8 +25,8 @@ from wbplan.gaits.manipulation import beside_way
 from wbplan.gaits.schedule import Beat, Ground, Schedule, Step, flat
 from wbplan.gaits.stance import Stance, Walker
 from wbplan.paths import AS_IS, MinJerk, name_of, number
-from wbplan.spec.script import Phase
-from wbplan.spec.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
+from wbplan.problem.script import Phase
+from wbplan.problem.tasks import ComTask, PoseTask, PositionTask, PostureTask, Task
 
 Array = NDArray[np.float64]
 Fields = Mapping[str, Any]
@@ -130,9 +131,11 @@ class Unfolding:
         step_time: of a step [s].
         rise: how high the foot is lifted straight [m] before the limb turns.
         speed: share of the joints' speed limits that may be used.
+        via: joint -> value at which it waits between two groups that both name it.
 
     Raises:
-        SpecError: the limb has no such roles, or a joint is none of its own.
+        SpecError: the limb has no such roles, a joint is none of its own, or `via` is not of those joints
+            that two groups name.
     """
 
     walker: Walker
@@ -143,20 +146,28 @@ class Unfolding:
     step_time: float
     rise: float = 0.04
     speed: float = 0.9
+    via: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         robot = self.walker.robot
         if not {"leg", "arm"} <= set(robot.roles.get(self.limb, {})):
             raise SpecError(f"Unfolding.limb: {self.limb!r} has no roles 'leg' and 'arm'")
         own = robot.limbs[self.limb]
-        named = (*self.pose, *self.clear, *(name for group in self.order for name in group))
+        grouped = [name for group in self.order for name in group]
+        named = (*self.pose, *self.clear, *grouped)
         strange = [name for name in named if name_of(name, "Unfolding: joint") not in own]
         if strange:
             raise SpecError(f"Unfolding: {listing(strange)} is no joint of {self.limb}: {listing(own)}")
         for key in ("step_time", "rise", "speed"):
             number(getattr(self, key), f"Unfolding.{key}", "a positive number", above=0.0)
-        object.__setattr__(self, "pose", MappingProxyType(dict(self.pose)))
-        object.__setattr__(self, "clear", MappingProxyType(dict(self.clear)))
+        if {name for name in grouped if grouped.count(name) == 2} != set(self.via) or max(
+            map(grouped.count, grouped), default=0
+        ) > 2:
+            raise SpecError(
+                f"Unfolding.via: expected a value for each joint that two groups name, got {dict(self.via)}"
+            )
+        for key in ("pose", "clear", "via"):
+            object.__setattr__(self, key, MappingProxyType(dict(getattr(self, key))))
 
     def out(self, foothold: Array) -> tuple[Fields, ...]:
         """From the step in which the foot leaves the ground to the one after which the limb is an arm.
@@ -171,29 +182,24 @@ class Unfolding:
             {"hard": (up,), "soft": (self.posture(self.clear),)},
             {"soft": (self.posture(self._shoulder),)},
         ]
-        before = self._as_leg
-        for k in range(len(self.order)):
-            goal = {**before, **{name: self._as_arm[name] for name in self.order[k]}}
+        places = self._places
+        for k, (before, goal) in enumerate(pairwise(places)):
             last = k == len(self.order) - 1
             for driven in self._driven(before, goal, k):
                 found.append({"soft": (self.posture(self._shoulder),), "driven": driven})
             if last:  # the role brings its own joints to their values, and sets the others free
                 found[-1] = {"soft": (self.posture(self.pose),), "roles": {self.limb: "arm"}}
-            before = goal
         return tuple(found)
 
     def back(self) -> tuple[Fields, ...]:
         """From the first step in which the limb folds to the last one before its foot lands."""
         found: list[Fields] = []
-        before = self._as_arm
-        for k in reversed(range(len(self.order))):
-            goal = {**before, **{name: self._as_leg[name] for name in self.order[k]}}
+        for k, (goal, before) in reversed(list(enumerate(pairwise(self._places)))):
             shoulder = self._shoulder if k == len(self.order) - 1 else self.clear
             for driven in self._driven(before, goal, k):
                 found.append({"soft": (self.posture(shoulder),), "driven": driven})
             if k == 0:
                 found[-1] = {"soft": (self.posture(self.clear),), "roles": {self.limb: "leg"}}
-            before = goal
         return tuple(found)
 
     def lowered(self, foothold: Array, body: Any, above: float = 0.012) -> Fields:
@@ -227,6 +233,15 @@ class Unfolding:
         """The pose's values of joints that are in no group."""
         grouped = {name for group in self.order for name in group}
         return {name: value for name, value in self.pose.items() if name not in grouped}
+
+    @property
+    def _places(self) -> list[dict[str, float]]:
+        """Where the groups' joints are as a leg, and after each group as it unfolds."""
+        found, as_arm = [self._as_leg], self._as_arm
+        for k, group in enumerate(self.order):
+            later = {name for other in self.order[k + 1 :] for name in other}
+            found.append(found[-1] | {n: self.via[n] if n in later else as_arm[n] for n in group})
+        return found
 
     @property
     def _as_arm(self) -> dict[str, float]:

@@ -12,11 +12,11 @@ from wbplan.geometry import support_polygon
 from wbplan.papers.hiphant import configuration
 from wbplan.papers.rows import Row
 from wbplan.planner import Plan, plan
+from wbplan.problem.contacts import Contact
+from wbplan.problem.objectives import ManipulabilityTask
+from wbplan.problem.script import Phase
 from wbplan.program.stack import Stack
 from wbplan.robot import load_robot
-from wbplan.spec.contacts import Contact
-from wbplan.spec.objectives import ManipulabilityTask
-from wbplan.spec.script import Phase
 from wbplan.state import State
 from wbplan.taskfile import load_task
 

@@ -16,11 +16,11 @@ from wbplan.papers.mana import JOINTS, LEGS, TABLE_5, TABLE_6, named, numbers, p
 from wbplan.papers.rows import Row
 from wbplan.paths import Waypoints
 from wbplan.planner import plan
+from wbplan.problem.contacts import Contact
+from wbplan.problem.limits import JointLimits
+from wbplan.problem.script import Phase, Script
+from wbplan.problem.tasks import PoseTask
 from wbplan.robot import load_robot
-from wbplan.spec.contacts import Contact
-from wbplan.spec.limits import JointLimits
-from wbplan.spec.script import Phase, Script
-from wbplan.spec.tasks import PoseTask
 
 Array = NDArray[np.float64]
 row = partial(Row, "MANA")

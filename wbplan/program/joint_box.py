@@ -51,6 +51,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from wbplan.compiled.phase import CompiledPhase
+from wbplan.errors import SpecError
 
 Array = NDArray[np.float64]
 
@@ -263,6 +264,11 @@ class JointBox:
             self._share = np.minimum(
                 0.9, np.minimum(BRAKING * self._jerk / (2 * self.most), self.slowing / self.reach)
             )
+            if (slow := np.flatnonzero(self._share < 1e-9)).size:
+                name = phase.robot.joint_names[joints[slow[0]] - 6]
+                raise SpecError(
+                    f"phase '{phase.phase.name}': jerk of joint '{name}' is too small to come to rest"
+                )
             self._rest = _ways_to_rest(self._share, self.reach, self.slowing)
 
     def brake_as(self, acceleration: Array) -> None:
@@ -369,8 +375,21 @@ def _ways_to_rest(share: Array, reach: Array, last: Array) -> Array:
     """
     rest = np.zeros((len(share), 3))
     for i, (m, v, x) in enumerate(zip(share, reach, last, strict=True)):
-        ticks = 2
-        while (1 - m) ** (1 - ticks) * x / (2 * m * ticks) < v or (1 - m) ** (1 - ticks) * x / 2 < v:
-            ticks += 1
-        rest[i] = ticks, x, x / (2 * m * ticks)
+        shrinks = -math.log1p(-m)
+
+        def fast_enough(t: float, m: float = m, v: float = v, x: float = x, rate: float = shrinks) -> bool:
+            growth = math.exp(min((t - 1) * rate, 300.0))
+            return growth * x / (2 * m * t) >= v and growth * x / 2 >= v
+
+        # Where x may be fast enough is known; the bound of s falls first, and is searched where it rises.
+        low = max(2.0, math.ceil(1.0 + math.log(max(2.0 * v / x, 1.0)) / shrinks))
+        if not fast_enough(low):
+            low, high = max(low, 1.0 / shrinks), max(2.0 * low, 2.0 / shrinks)
+            while not fast_enough(high):
+                high *= 2.0
+            while high - low > 1.0:
+                middle = math.floor(0.5 * (low + high))
+                low, high = (low, middle) if fast_enough(middle) else (middle, high)
+            low = math.ceil(high)
+        rest[i] = low, x, x / (2 * m * low)
     return rest

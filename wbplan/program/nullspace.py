@@ -16,7 +16,7 @@ DEPENDENT = 1e-8
 def null_basis(rows: Array) -> Array:
     """(n, p) orthonormal basis of the steps that move none of the rows (m, n)."""
     m, n = rows.shape
-    if m == 0:
+    if m == 0 or n == 0:
         return np.eye(n)
     factor, _, tau, _, _ = lapack.dgeqp3(rows.T)
     rank = int(np.count_nonzero(np.abs(np.diagonal(factor)) > DEPENDENT))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import final
 
+import daqp
 import numpy as np
 import pinocchio as pin
-import proxsuite
 from numpy.typing import NDArray
 
 from wbplan.program.joint_box import UNBOUNDED
@@ -21,8 +22,14 @@ DRIFT = 1e-5
 #: Most corrections in one tick.
 MOST = 4
 
-#: Most iterations of the solver, outer and inner: rows that contradict each other would keep it for minutes.
-PATIENCE = 100
+#: Most changes of the solver's active bounds.
+PATIENCE = 1000
+
+#: Room [m or rad] of the hard rows, which may depend on each other.
+ROOM = 1e-9
+
+#: Cost of a step against that of missing a row.
+FAINT = 1e-6
 
 #: Singular values of the hard rows below this share of the largest are left alone: a loop at a singular
 #: configuration is not opened by what it cannot close.
@@ -81,13 +88,45 @@ class Retraction:
         least = np.asarray(np.linalg.lstsq(stack.A, stack.b, rcond=SINGULAR)[0], dtype=np.float64)
         if (lower <= least).all() and (least <= upper).all() and (stack.C @ least <= stack.d).all():
             return least
-        n, edges = len(stack.g), len(stack.d)
-        qp = proxsuite.proxqp.dense.QP(n, len(stack.b), edges, True)
-        qp.settings.eps_abs = 1e-9
-        qp.settings.max_iter = qp.settings.max_iter_in = PATIENCE
-        qp.settings.primal_infeasibility_solving = True
-        unbounded = np.full(edges, -UNBOUNDED)
-        qp.init(np.eye(n), np.zeros(n), stack.A, stack.b, stack.C, unbounded, stack.d, lower, upper)
-        qp.solve()
-        closest: Array = qp.results.x.copy()
-        return closest if np.isfinite(closest).all() else None
+        if not (math.isfinite(stack.A.sum() + stack.C.sum()) and math.isfinite(stack.b.sum())):
+            return None
+        used = np.flatnonzero(stack.d < UNBOUNDED)
+        rows = (stack.A, stack.b, stack.C[used], stack.d[used], lower, upper)
+        found = _least(*rows)
+        return _nearest(*rows) if found is None else found
+
+
+def _least(A: Array, b: Array, C: Array, d: Array, lower: Array, upper: Array) -> Array | None:
+    """The least x with A x = b, C x <= d within the box; None where there is none."""
+    return _ask(
+        np.eye(len(lower)),
+        np.zeros(len(lower)),
+        np.vstack([A, C]),
+        np.concatenate([lower, b - ROOM, np.full(len(d), -UNBOUNDED)]),
+        np.concatenate([upper, b + ROOM, d]),
+    )
+
+
+def _nearest(A: Array, b: Array, C: Array, d: Array, lower: Array, upper: Array) -> Array | None:
+    """The x within the box that misses the rows least, by least squares; there is always one."""
+    n, k = len(lower), len(d)
+    H = np.eye(n + k)
+    H[:n, :n] = A.T @ A + FAINT * np.eye(n)
+    free = np.full(k, UNBOUNDED)
+    found = _ask(
+        H,
+        np.concatenate([-A.T @ b, np.zeros(k)]),
+        np.hstack([C, -np.eye(k)]),
+        np.concatenate([lower, -free, -free]),
+        np.concatenate([upper, free, d]),
+    )
+    return None if found is None else found[:n]
+
+
+def _ask(H: Array, g: Array, rows: Array, lower: Array, upper: Array) -> Array | None:
+    x, _, flag, _ = daqp.solve(
+        H, g, np.ascontiguousarray(rows), upper, lower, np.zeros(len(upper), dtype=np.int32),
+        primal_tol=0.1 * ROOM, iter_limit=PATIENCE,
+    )  # fmt: skip
+    x = np.asarray(x, dtype=np.float64)
+    return x if flag == 1 and np.isfinite(x).all() else None

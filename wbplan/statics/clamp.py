@@ -11,8 +11,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.errors import SolveError
-from wbplan.spec.bodies import Grip, Held
-from wbplan.spec.script import Phase
+from wbplan.problem.bodies import Grip, Held
+from wbplan.problem.script import Phase
 from wbplan.statics.grip import Squeeze, box_normal, force_closure, smallest_squeeze
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.errors import SolveError, SpecError
-from wbplan.spec.bodies import Held
-from wbplan.spec.limits import Forces
-from wbplan.spec.script import Phase
+from wbplan.problem.bodies import Held
+from wbplan.problem.limits import Forces
+from wbplan.problem.script import Phase
 from wbplan.statics.clamp import Clamp, clamps_of
 from wbplan.statics.cones import friction_use
 from wbplan.statics.forces import ForceQP, effort, least_effort, within

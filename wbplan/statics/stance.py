@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
-from wbplan.spec.bodies import frame_number
-from wbplan.spec.script import Phase
-from wbplan.spec.tasks import FrameTask
+from wbplan.problem.bodies import frame_number
+from wbplan.problem.script import Phase
+from wbplan.problem.tasks import FrameTask
 from wbplan.state import State
 from wbplan.statics.region import hull_is_exact, support_region
 

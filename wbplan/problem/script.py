@@ -11,11 +11,11 @@ from typing import Any, final
 from wbplan.errors import SpecError, listing
 from wbplan.obstacles import Obstacle
 from wbplan.paths import NUMBER, Path, as_path, name_of, number
-from wbplan.spec.bodies import Body, Carried
-from wbplan.spec.contacts import Contact, Push
-from wbplan.spec.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
-from wbplan.spec.objectives import ManipulabilityTask, Objective
-from wbplan.spec.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
+from wbplan.problem.bodies import Body, Carried
+from wbplan.problem.contacts import Contact, Push
+from wbplan.problem.limits import Forces, JointLimits, Obstacles, SelfCollision, SupportPolygon
+from wbplan.problem.objectives import ManipulabilityTask, Objective
+from wbplan.problem.tasks import DampingTask, FrameTask, RelativePoseTask, Task, check_kind
 from wbplan.state import State
 
 Limit = JointLimits | SupportPolygon | SelfCollision | Obstacles | Forces

@@ -35,7 +35,7 @@ GAIN = 20.0
 
 def _weights(value: object, count: int, what: str) -> Array:
     """Read-only (count,) weights from one number or `count` of them."""
-    expected = "a finite number of 0 or more" + (f", or {count} of them" if count > 1 else "")
+    expected = f"a finite number from 0 to {MOST:g}" + (f", or {count} of them" if count > 1 else "")
     given = numeric(value)
     if given is None or given.shape not in ((), (count,)) or not ((given >= 0.0) & (given <= MOST)).all():
         raise SpecError(f"{what}: expected {expected}, got {value!r}")

@@ -10,7 +10,7 @@ from typing import final
 
 from wbplan.errors import SpecError
 from wbplan.paths import name_of, number
-from wbplan.spec.tasks import GAIN, Task
+from wbplan.problem.tasks import GAIN, Task
 
 #: Rows of a tip's velocity (linear, then angular; world axes) that each kind of manipulability is of.
 KINDS = {"translation": slice(0, 3), "rotation": slice(3, 6), "whole": slice(0, 6)}

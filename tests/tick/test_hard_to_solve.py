@@ -1,0 +1,90 @@
+"""Ticks that ask too much of a solver: refused or told of, and never stuck."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wbplan as wb
+from wbplan.program.nullspace import null_basis
+
+BACKENDS = ["proxqp", "placo"]
+
+
+def standing(robot: wb.Robot, soft: list[Any], limits: list[Any]) -> wb.Phase:
+    return wb.Phase("stand", contacts=[wb.Contact(f) for f in robot.feet.values()], soft=soft, limits=limits)
+
+
+@pytest.mark.parametrize("size", [1e10, 1e29])
+@pytest.mark.parametrize(("backend", "levels"), [("proxqp", 1), ("proxqp", 2), ("placo", 1)])
+def test_absurd_targets_and_weights_are_followed_or_refused(
+    legarm: wb.Robot, backend: str, size: float, levels: int
+) -> None:
+    start = legarm.state("stand")
+    soft: list[Any] = [wb.PositionTask("body", start.pose("body").translation + size, weight=min(size, 1e6))]
+    soft += [wb.ComTask(start.com - size, weight=1.0), wb.PostureTask(weight=0.1)]
+    phase = standing(legarm, [soft[:1], soft[1:]] if levels > 1 else soft, [wb.JointLimits()])
+    loop = wb.Loop(legarm, phase, start, dt=0.01, backend=backend)
+    for _ in range(3):
+        before = loop.q.copy()
+        try:
+            tick = loop.step()
+        except wb.SolveError:
+            np.testing.assert_array_equal(loop.q, before)
+            continue
+        assert np.isfinite(tick.q).all()
+        assert np.isfinite(list(tick.errors.values())).all()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_joint_that_comes_into_a_phase_too_fast_slows_down_and_is_named(
+    legarm: wb.Robot, backend: str
+) -> None:
+    limits = wb.JointLimits(speed=0.05, acceleration=2.0)
+    phase = wb.Phase("slow", soft=[wb.PostureTask()], limits=[limits])
+    name = "leg3_joint2"
+    column = legarm.joint_index(name)[1]
+    velocity = np.zeros(legarm.model.nv)
+    most = 0.05 * legarm.model.velocityLimit[column]
+    velocity[column] = 1.3 * most
+    loop = wb.Loop(legarm, phase, legarm.state("stand"), dt=0.01, backend=backend, velocity=velocity)
+    ticks = [loop.step() for _ in range(40)]
+    speeds = np.abs([velocity[column], *(tick.v[column] for tick in ticks)])
+    fast = speeds[1:] > most * (1 + 1e-6)
+    assert fast[0]
+    assert not fast[-1]
+    assert (np.diff(speeds)[fast] < 0.0).all()
+    assert [f"speed not yet within its limit: {name}" in tick.warning for tick in ticks] == list(fast)
+
+
+@pytest.mark.parametrize("jerk", [1e-300, 1e-9, 1e-3])
+def test_a_tiny_jerk_limit_does_not_take_for_ever(legarm: wb.Robot, jerk: float) -> None:
+    """How long a joint needs to come to rest is searched for: tick by tick it would be never."""
+    phase = wb.Phase("still", soft=[wb.PostureTask()], limits=[wb.JointLimits(jerk=jerk)])
+    if jerk < 1e-6:
+        with pytest.raises(wb.SpecError, match="too small to come to rest"):
+            wb.Loop(legarm, phase, legarm.state("stand"), dt=0.01)
+        return
+    assert np.isfinite(wb.Loop(legarm, phase, legarm.state("stand"), dt=0.01).step().q).all()
+
+
+def test_numbers_whose_squares_are_none_are_refused(legarm: wb.Robot) -> None:
+    with pytest.raises(wb.SpecError, match="1e\\+30"):
+        wb.PositionTask("body", np.array([1e200, 0.0, 0.0]))
+    with pytest.raises(wb.SpecError):
+        wb.PostureTask(weight=1e200)
+    q = np.array(legarm.state("stand").q)
+    q[0] = 1e200
+    with pytest.raises(wb.SpecError, match="q\\[0\\]"):
+        legarm.state(q)
+    for dt in (1e-300, 1e200):
+        with pytest.raises(wb.SpecError, match="dt"):
+            wb.Loop(legarm, standing(legarm, [], []), legarm.state("stand"), dt=dt)
+
+
+def test_where_no_step_is_left_no_row_narrows_it(capfd: pytest.CaptureFixture[str]) -> None:
+    assert null_basis(np.zeros((4, 0))).shape == (0, 0)
+    assert null_basis(np.zeros((0, 3))).shape == (3, 3)
+    assert not capfd.readouterr().out  # LAPACK complains there about what it cannot take

@@ -1,1 +1,0 @@
-"""What a user says: tasks, contacts, limits, bodies, phases and scripts; frozen, and complete when built."""
