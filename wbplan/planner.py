@@ -170,7 +170,7 @@ def plan(
     state = start if isinstance(start, State) else robot.state(start)
     if list(state.model.names) != list(robot.model.names):  # its q may be of the same size
         raise SpecError(f"start: a state of '{state.model.name}', expected one of '{robot.name}'")
-    q, roles, velocity = np.array(state.q), None, np.zeros(robot.model.nv)
+    q, roles, (velocity, acceleration) = np.array(state.q), None, np.zeros((2, robot.model.nv))
     _inside_limits(robot, q)
     placed: dict[str, Any] = {b.name: b.pose for b in script.bodies if b.pose is not None}
     _compile_kernels(robot, script.phases[0], q, dt, backend, placed)
@@ -194,7 +194,7 @@ def plan(
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
         loop = Loop(
             robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies,
-            velocity=velocity, rest_at=(sum(lengths) - done) * dt,
+            velocity=velocity, acceleration=acceleration, rest_at=(sum(lengths) - done) * dt,
             braking=_least_braking(robot, script.phases[index:], q),
         )  # fmt: skip
         _promises_hold(loop, phase)
@@ -215,7 +215,8 @@ def plan(
                 raise SolveError(said, error.clashes, error.limits, kept) from None
             recorder.record(loop, tick)
         done += ticks
-        q, roles, velocity = loop.q, loop.compiled.roles, loop.velocity
+        q, roles = loop.q, loop.compiled.roles
+        velocity, acceleration = loop.velocity, loop.acceleration
         placed.update(_where_held(loop.compiled, q))
         recorder.end(index, loop, done * dt)
     if observe is not None:

@@ -30,6 +30,7 @@ from wbplan.paths import number, vector
 from wbplan.problem.bodies import Body
 from wbplan.problem.script import Phase
 from wbplan.program.diagnose import solve_error
+from wbplan.program.entry import check_inside, check_stops
 from wbplan.program.qp import Solution
 from wbplan.program.retract import DRIFT, Retraction
 from wbplan.program.stack import Stack
@@ -150,11 +151,12 @@ class Loop:
         roles: the role that each limb is in, where `q` leaves it open.
         bodies: the bodies that there are; those in `placed` that are not carried stand in the way.
         velocity: (nv,) at which it starts, as `Loop.velocity` of a loop before [m/s, rad/s]; at rest.
+        acceleration: (nv,) with which it starts, as `Loop.acceleration` of a loop before; none.
         rest_at: time [s] of the phase by which all joints are to be at rest; by default never.
         braking: (n,) accelerations [rad/s^2, m/s^2] that phases after this one leave for braking.
 
     Attributes:
-        velocity: (nv,) of the last step [m/s, rad/s].
+        velocity: (nv,) of the last step [m/s, rad/s]; acceleration: (nv,) from the one before to it.
         last: the last tick made; None before the first.
         too_fast: joints that came into the phase faster than its limits let them go, and still slow down.
 
@@ -174,6 +176,7 @@ class Loop:
         roles: Mapping[str, str | None] | None = None,
         bodies: Sequence[Body] = (),
         velocity: Array | None = None,
+        acceleration: Array | None = None,
         rest_at: float | None = None,
         braking: Array | None = None,
     ) -> None:
@@ -190,17 +193,23 @@ class Loop:
         self._retraction = Retraction(self.stack)
         self.last: Tick | None = None
         self._replay = Replay(self.compiled, self.dt)
-        self._begin(velocity, rest_at, braking)
+        self._begin(velocity, acceleration, rest_at, braking)
 
-    def _begin(self, velocity: Array | None, rest_at: float | None, braking: Array | None) -> None:
+    def _begin(
+        self, velocity: Array | None, acceleration: Array | None, rest_at: float | None, braking: Array | None
+    ) -> None:
         """How it moves when the phase begins, and when it is to be at rest."""
         nv = self.compiled.model.nv
         self.velocity = vector(np.zeros(nv) if velocity is None else velocity, nv, "Loop: velocity")
         self._rest_at = None if rest_at is None else number(rest_at, "Loop: rest_at", "a time in seconds")
         joints = self.compiled.free[6:]
-        self.stack.begin(self.velocity * self.dt)
+        still = np.zeros(nv) if acceleration is None else acceleration
+        self.acceleration = vector(still, nv, "Loop: acceleration")
+        step = self.velocity * self.dt
+        self.stack.begin(step, step - self.acceleration * self.dt**2)
         self.too_fast = self._faster_than_limits()
         check_given(self.compiled, self.velocity, self.dt)
+        check_stops(self.compiled, self.stack.box, self.q)
         if braking is not None:
             self.stack.box.brake_as(vector(braking, nv - 6, "Loop: braking")[joints - 6])
 
@@ -299,7 +308,8 @@ class Loop:
         pace = stack.box.keep_pace()
         replay = partial(self._replay.why, self.backend, q, began, keep_goals(stack), pace, solution)
         held_back = HeldBack(stack, solution)
-        self.velocity = taken / self.dt
+        before_it, self.velocity = self.velocity, taken / self.dt
+        self.acceleration = (self.velocity - before_it) / self.dt
         stack.box.took(taken[stack.free], stack.kinematics.com - com)
         if self.too_fast:
             self.too_fast = self._faster_than_limits()
@@ -321,6 +331,8 @@ class Loop:
         new: Array = pin.integrate(model, q, step)
         if not math.isfinite(new.sum()):
             raise SolveError(f"phase '{self.compiled.phase.name}': the solver's step is not finite")
+        if stack.box.jerky:
+            check_inside(self.compiled, stack.box, q, new)
         stack.measure(new)
         if self._kept(before):
             return new

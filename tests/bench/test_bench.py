@@ -16,6 +16,7 @@ from rich.console import Console
 from wbplan.bench import SCENES, Lap, Row, Scene, make_solvers, race, rows_of, table_of, write_json
 from wbplan.bench.__main__ import main
 from wbplan.bench.breakdown import PARTS, breakdown
+from wbplan.bench.clearance import clearance_cost, clearance_text
 from wbplan.bench.solvers import pink_is_installed
 from wbplan.errors import BundleError
 from wbplan.program.stack import Stack
@@ -181,3 +182,16 @@ def _text(table: object) -> str:
     with console.capture() as captured:
         console.print(table)
     return captured.get()
+
+
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_what_distances_cost(name: str) -> None:
+    """The same scene, and a promise that takes part: pairs, measured ones and rows are counted."""
+    scene = SCENES[name](60)
+    cost = clearance_cost(scene)
+    assert cost.pairs > 1000
+    assert 0 < cost.rows <= cost.checked < 0.1 * cost.pairs
+    assert min(cost.without, cost.along) > 0.0
+    text = clearance_text(scene)
+    assert f"clearance of '{name}'" in text
+    assert f"of {cost.pairs} pairs" in text

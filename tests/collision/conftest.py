@@ -18,6 +18,7 @@ SHAPES = {
     "sphere": '<sphere radius="0.06"/>',
     "box": '<box size="0.1 0.14 0.2"/>',
     "cylinder": '<cylinder radius="0.05" length="0.2"/>',
+    "capsule": '<capsule radius="0.05" length="0.12"/>',
     "mesh": '<mesh filename="stone.obj"/>',
 }
 

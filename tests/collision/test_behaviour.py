@@ -224,17 +224,23 @@ def test_distances_are_those_of_mujoco(make_robot: MakeRobot) -> None:
     """The limit's least distance against the other library's, on random poses of every shape."""
     rng = np.random.default_rng(5)
     assert mujoco.mj_geomDistance  # what the checks use
-    for base, hand in (("box", "cylinder"), ("mesh", "box"), ("cylinder", "sphere")):
+    for base, hand in (
+        ("box", "cylinder"),
+        ("mesh", "box"),
+        ("cylinder", "sphere"),
+        ("capsule", "box"),
+        ("mesh", "capsule"),
+    ):
         robot = make_robot(base, hand)
         q = pin.neutral(robot.model)
         q[7:] = rng.uniform([-2, -0.6, -2], [2, 0.6, 2])
         phase = wb.Phase(
-            "x", hard=[wb.PoseTask("base", wb.AS_IS)], limits=[wb.JointLimits(), wb.SelfCollision(0.0, 0.3)]
+            "x", hard=[wb.PoseTask("base", wb.AS_IS)], limits=[wb.JointLimits(), wb.SelfCollision(0.0, 0.6)]
         )
         plan = wb.plan(robot, phase, start=robot.state(q), dt=0.5)
         loop = wb.Loop(robot, phase, q)
         assert loop.stack.clearance is not None
         bundle = plan.bundle
-        bundle.phases[0]["kept_apart"]["self"] = 0.28
+        bundle.phases[0]["kept_apart"]["self"] = 0.58
         row = check(bundle, folders=plan._folders)["clearance"]
         assert row.worst == pytest.approx(loop.stack.clearance.least, abs=2e-6)

@@ -14,7 +14,7 @@ from wbplan.collision import CAPACITY
 from wbplan.program.stack import UNBOUNDED
 
 MakeRobot = Callable[[str, str], wb.Robot]
-SHAPES = ("sphere", "box", "cylinder", "mesh")
+SHAPES = ("sphere", "box", "cylinder", "capsule", "mesh")
 CORNERS = [
     [-0.06, -0.05, -0.1],
     [0.07, -0.04, -0.1],

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from wbplan.program.joint_box import BRAKING, NEVER, _ways_to_rest, box, brake, jerk_box, stopping
+from wbplan.program.jerk_box import jerk_box, ways_to_rest
+from wbplan.program.joint_box import BRAKING, NEVER, box, brake, stopping
 
 TICKS = 150
 seeds = st.integers(0, 2**32 - 1)
@@ -83,7 +84,7 @@ def test_with_a_bound_on_the_jerk_too(seed: int) -> None:
     jerk = 10 ** joints.rng.uniform(0, 5, joints.n) * joints.dt**3
     slowing = BRAKING * joints.most
     share = np.minimum(0.9, np.minimum(BRAKING * jerk / (2 * joints.most), slowing / joints.reach))
-    rest = _ways_to_rest(np.maximum(share, 1e-3), joints.reach, slowing)
+    rest = ways_to_rest(np.maximum(share, 1e-3), joints.reach, slowing)
     for _ in range(TICKS):
         joints.fill()
         jerk_box(

@@ -57,7 +57,7 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
     out = Outcome()
     robot = any_robot(rng)
     state = start_of(rng, robot)
-    q, roles, velocity = np.array(state.q), None, None
+    q, roles, velocity, acceleration = np.array(state.q), None, None, None
     placed: dict[str, Any] = {}
     dt = rng.choice((0.001, 0.002, 0.005, 0.01, 0.02))
     for k in range(rng.randint(1, 4)):
@@ -67,8 +67,9 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
             if len(made.phase.levels) > 1:
                 backend = "proxqp"  # the one that has levels
             loop = wb.Loop(
-                robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles, velocity=velocity
-            )
+                robot, made.phase, q, dt, backend=backend, placed=placed, roles=roles,
+                velocity=velocity, acceleration=acceleration,
+            )  # fmt: skip
         except wb.WbplanError as error:
             out.counts[f"phase refused: {kind_of(error)}"] += 1
             continue
@@ -77,11 +78,13 @@ def run_episode(seed: int, number: int, *, most: int = 4 * LONGEST) -> Outcome:
         polygon = loop.compiled.polygon
         region = (polygon.normals, polygon.offsets) if polygon is not None and loop.compiled.region else None
         bounds = loop.compiled.acceleration
-        watch = Watch(robot, made.phase, q, dt, held, region, bounds, velocity)
+        watch = Watch(robot, made.phase, q, dt, held, region, bounds, velocity, acceleration)
         _run_phase(rng, loop, made, watch, out, backend, min(LONGEST, most - out.ticks))
         out.add({}, watch.worst, [])
         q, roles = np.array(loop.q), loop.compiled.roles
-        velocity = np.array(loop.velocity) if rng.random() < 0.5 else None
+        moves = rng.random() < 0.5
+        velocity = np.array(loop.velocity) if moves else None
+        acceleration = np.array(loop.acceleration) if moves else None
         if out.found or out.ticks >= most:
             break
     return out

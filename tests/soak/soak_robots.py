@@ -11,6 +11,9 @@ from pathlib import Path
 import wbplan as wb
 from wbplan import catalog
 
+#: So many robots are generated: PlaCo keeps the memory of every one that it was ever told of.
+MADE = 24
+
 
 @cache
 def shipped(name: str) -> wb.Robot:
@@ -20,12 +23,14 @@ def shipped(name: str) -> wb.Robot:
 def any_robot(rng: random.Random) -> wb.Robot:
     """A shipped robot, or one in four times a generated one."""
     if rng.random() < 0.25:
-        return generated(rng)
+        return generated(rng.randrange(MADE))
     return shipped(rng.choice(list(catalog.robots())))
 
 
-def generated(rng: random.Random) -> wb.Robot:
+@cache
+def generated(number: int) -> wb.Robot:
     """A body on three to six alike legs, often with an arm; sometimes with a joint that slides."""
+    rng = random.Random(number)
     with tempfile.TemporaryDirectory(prefix="soak.") as folder:
         path = Path(folder) / "made.urdf"
         urdf, srdf = _texts(rng)

@@ -81,7 +81,7 @@ def scene(rng: random.Random, robot: wb.Robot, state: wb.State, name: str) -> Sc
     out.phase = wb.Phase(
         name,
         contacts=[wb.Contact(foot) for foot in stands],
-        carried=_load(rng, [*hands, frames[0]], name),
+        carried=_load(rng, [*hands, frames[0]]),
         hard=hard,
         soft=_levels(rng, soft),
         limits=limits,
@@ -123,12 +123,10 @@ def _gain(rng: random.Random) -> float:
     return rng.choice((0.5, 5.0, 20.0, 20.0, 100.0, 1e4))
 
 
-def _load(rng: random.Random, holders: list[str], name: str) -> list[wb.Carried]:
+def _load(rng: random.Random, holders: list[str]) -> list[wb.Carried]:
     if rng.random() > 0.25:
         return []
-    body = wb.Body(
-        f"load_{name}", mass=rng.choice((0.0, 0.3, 2.0, 50.0)), size=(0.1, 0.2, 0.1), com=(0.0, 0.02, 0.0)
-    )
+    body = wb.Body("load", mass=rng.choice((0.0, 0.3, 2.0, 50.0)), size=(0.1, 0.2, 0.1), com=(0.0, 0.02, 0.0))
     pose = pin.SE3(turned(rng, 1.0), moved(rng, 0.1))
     return [wb.Carried(body, by=rng.choice(holders), pose=pose if rng.random() < 0.5 else wb.AS_IS)]
 

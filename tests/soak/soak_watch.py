@@ -23,6 +23,7 @@ class Watch:
         region: normals and offsets of a polygon that is not the contacts' hull.
         acceleration: (n,) of every joint, where the phase names none [rad/s^2, m/s^2].
         velocity: (nv,) before the first tick; at rest.
+        changed: (nv,) acceleration before the first tick; none.
 
     Attributes:
         worst: promise -> the largest share of its bound that was used; above 1 it is broken.
@@ -30,7 +31,7 @@ class Watch:
 
     def __init__(
         self, robot: wb.Robot, phase: wb.Phase, q: Any, dt: float, held: dict[str, Any], region: Any = None,
-        acceleration: Any = None, velocity: Any = None,
+        acceleration: Any = None, velocity: Any = None, changed: Any = None,
     ) -> None:  # fmt: skip
         self.model = pin.buildModelFromXML(robot.urdf_text, pin.JointModelFreeFlyer())
         self.data = self.model.createData()
@@ -45,6 +46,7 @@ class Watch:
             k = robot.joint_index(name)[1] - 6
             self.reach[k] = self.model.velocityLimit[6 + k] * dt * 1.001
         self._accelerations(robot, phase, given, acceleration, velocity)
+        self._jerks(robot, phase, given, changed)
         self.distances, self.bound = None, 0.0
         if phase.self_collision is not None:
             self.distances, self.bound = Distances(robot, self.model), phase.self_collision.distance
@@ -77,6 +79,14 @@ class Watch:
             self.change[:] = limits.acceleration * self.dt**2
         for name in (*given, *phase.locked):
             self.change[robot.joint_index(name)[1] - 6] = np.inf
+
+    def _jerks(self, robot: wb.Robot, phase: wb.Phase, given: set[str], changed: Any) -> None:
+        """(n,) by how much each joint's change of step may differ from the last change."""
+        self.changed = np.zeros(self.model.nv - 6) if changed is None else np.array(changed[6:]) * self.dt**2
+        jerk = phase.joint_limits.jerk if phase.joint_limits else None
+        self.twist = np.full(self.model.nv - 6, np.inf if jerk is None else jerk * self.dt**3)
+        for name in (*given, *phase.locked):
+            self.twist[robot.joint_index(name)[1] - 6] = np.inf
 
     def _place(self, q: Any) -> None:
         pin.framesForwardKinematics(self.model, self.data, q)
@@ -129,7 +139,11 @@ class Watch:
             shares["speed"] = float((np.abs(step) / (reach + 1e-12)).max()) / (1.0 + 1e-6)
             over = (np.abs(step - self.step) - 1e-12) / self.change
             shares["acceleration"] = float(over.max()) / (1.0 + 1e-6)
-            self.step = step
+            # What comes in with more acceleration than the phase has loses it at once.
+            changed = step - self.step
+            over = np.abs(changed - np.clip(self.changed, -self.change, self.change)) - 1e-12
+            shares["jerk"] = float((over / self.twist).max()) / (1.0 + 1e-6)
+            self.step, self.changed = step, changed
         if self.distances is not None:
             apart = self.distances.at(q)
             short = np.minimum(self.apart, self.bound) - apart

@@ -70,6 +70,52 @@ def test_a_tiny_jerk_limit_does_not_take_for_ever(legarm: wb.Robot, jerk: float)
     assert np.isfinite(wb.Loop(legarm, phase, legarm.state("stand"), dt=0.01).step().q).all()
 
 
+@pytest.mark.parametrize(
+    ("speed", "limits", "why"),
+    [
+        (2.0, wb.JointLimits(acceleration=1.0), "cannot stop before it"),
+        (2.0, wb.JointLimits(acceleration=1e3, jerk=1.0), "with the phase's jerk it cannot stop"),
+        (0.1, wb.JointLimits(acceleration=10.0), None),
+        (0.1, wb.JointLimits(acceleration=100.0, jerk=1e4), None),
+    ],
+)
+def test_a_start_from_which_no_joint_could_stop_is_refused(
+    legarm: wb.Robot, speed: float, limits: wb.JointLimits, why: str | None
+) -> None:
+    start = legarm.state("stand")
+    velocity = np.zeros(legarm.model.nv)
+    place, column = legarm.joint_index("leg3_joint2")
+    velocity[column] = speed
+    phase = wb.Phase("stop", soft=[wb.PostureTask(weight=1e-3)], limits=[limits])
+    if why is not None:
+        with pytest.raises(wb.SpecError, match=why):
+            wb.Loop(legarm, phase, start, dt=0.01, velocity=velocity)
+        return
+    loop = wb.Loop(legarm, phase, start, dt=0.01, velocity=velocity)
+    for _ in range(100):
+        tick = loop.step()
+    assert tick.q[place] <= legarm.model.upperPositionLimit[place] + 1e-9
+
+
+def test_jerk_is_kept_where_one_phase_follows_another(legarm: wb.Robot) -> None:
+    """The acceleration goes on with the speed."""
+    joint, dt, jerk = "leg3_joint2", 0.01, 3000.0
+
+    def loop(name: str, to: float, q: Any, **moving: Any) -> wb.Loop:
+        soft = [wb.PostureTask({joint: to}, gain=100.0)]
+        return wb.Loop(legarm, wb.Phase(name, soft=soft, limits=[wb.JointLimits(jerk=jerk)]), q, dt, **moving)
+
+    first = loop("go", 2.0, legarm.state("stand"))
+    column = legarm.joint_index(joint)[1]
+    speeds = [0.0, *(first.step().v[column] for _ in range(4))]
+    changes = {}
+    for name, moving in {"whole": {"acceleration": first.acceleration}, "half": {}}.items():
+        second = loop("back", -2.0, first.q, velocity=first.velocity, **moving)
+        taken = [*speeds, *(second.step().v[column] for _ in range(4))]
+        changes[name] = float(np.abs(np.diff(taken, 2)).max()) / dt**2
+    assert changes["whole"] <= jerk * (1 + 1e-6) < changes["half"]
+
+
 def test_numbers_whose_squares_are_none_are_refused(legarm: wb.Robot) -> None:
     with pytest.raises(wb.SpecError, match="1e\\+30"):
         wb.PositionTask("body", np.array([1e200, 0.0, 0.0]))

@@ -9,6 +9,7 @@ import wbplan as wb
 from wbplan.checks import check
 from wbplan.checks.clearance import nearest
 from wbplan.view.playback import page
+from wbplan.view.robot_meshes import robot_meshes
 
 
 @pytest.fixture(scope="module")
@@ -37,3 +38,11 @@ def test_the_nearest_pair_is_that_of_the_checks(plan: wb.Plan) -> None:
     assert gap == pytest.approx(worst.worst, abs=1e-9)
     assert names == worst.where
     assert np.linalg.norm(other - one) == pytest.approx(gap, abs=1e-6)
+
+
+def test_capsules_are_drawn_about_their_middles() -> None:
+    shape = '<geometry><capsule radius="0.05" length="0.2"/></geometry>'
+    body = f'<link name="rod"><collision>{shape}</collision></link>'
+    (mesh,) = robot_meshes(f'<robot name="one">{body}</robot>')
+    np.testing.assert_allclose(mesh.vertices.min(axis=0), [-0.05, -0.05, -0.15], atol=1e-6)
+    np.testing.assert_allclose(mesh.vertices.max(axis=0), [0.05, 0.05, 0.15], atol=1e-6)

@@ -23,6 +23,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.collision import kernels
+from wbplan.collision.broad import Broad
 from wbplan.collision.fields import Field
 from wbplan.collision.model import CollisionModel
 from wbplan.compiled.kinematics import Kinematics
@@ -33,8 +34,8 @@ Ints = NDArray[np.int64]
 #: Rows of a compiled phase; with more points near, the nearest have one.
 CAPACITY = 48
 
-#: Most pairs that are measured exactly in one tick.
-MEASURED = 1024
+#: Most triangles of height fields that may have rows in one tick; further ones are measured all the same.
+TRIANGLES = 1024
 
 #: Share of what is left of the distance that one tick may use up.
 SHARE = 0.5
@@ -88,28 +89,15 @@ class Clearance:
             self._rotations_all = np.tile(np.eye(3), (padded, 1, 1))
         else:
             self._places_all, self._rotations_all = self._places, self._rotations
-        self._offset, self._half = np.zeros((count, 3)), np.zeros((count, 3))
-        self._plane = np.zeros((count, 4))
-        for g, item in enumerate(objects):
-            if isinstance(item.geometry, coal.Halfspace):
-                normal = item.placement.rotation @ np.array(item.geometry.n)
-                offset = float(item.geometry.d + normal @ item.placement.translation)
-                self._plane[g] = *normal, offset
-                continue
-            item.geometry.computeLocalAABB()
-            low, high = np.array(item.geometry.aabb_local.min_), np.array(item.geometry.aabb_local.max_)
-            self._offset[g], self._half[g] = (low + high) / 2.0, (high - low) / 2.0
-        self._radius = np.linalg.norm(self._half, axis=1)
+        self._broad = Broad(self.model, self._rotations, self._places)
         self._middles = np.zeros((count, 3))
 
     def _pairs(self) -> None:
         model, shapes = self.model, len(self.model.geometry.geometryObjects)
         solid = int((model.second < shapes).sum())
-        self._solid = (model.first[:solid], model.second[:solid], model.influence[:solid])
         self._on_fields = [
             (p, int(model.first[p]), int(model.second[p]) - shapes) for p in range(solid, len(model.first))
         ]
-        self._found = np.zeros(max(solid, 1), dtype=np.int64)
         joints = np.array([thing.joint for thing in model.things], dtype=np.int64)
         self._joint_a, self._joint_b = joints[model.first], joints[model.second]
         pinocchio = self._kinematics.model
@@ -131,9 +119,10 @@ class Clearance:
         self._local = np.zeros((2, n, 3))
         self._world = np.zeros((2, n, 3))
         self._towards, self._gap = np.zeros((n, 3)), np.zeros(n)
-        self._keys, self._of = np.zeros(MEASURED, dtype=np.int64), np.zeros(MEASURED, dtype=np.int64)
-        self._distance, self._normal = np.zeros(MEASURED), np.zeros((MEASURED, 3))
-        self._points = np.zeros((2, MEASURED, 3))
+        room = len(self.model.first) + TRIANGLES
+        self._keys, self._of = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
+        self._distance, self._normal = np.zeros(room), np.zeros((room, 3))
+        self._points = np.zeros((2, room, 3))
 
     # -- each tick ---------------------------------------------------------------------------------------
 
@@ -141,14 +130,8 @@ class Clearance:
         """Distances at the kinematics' configuration, and which rows they make."""
         kin, model = self._kinematics, self.model
         pin.updateGeometryPlacements(kin.model, kin.data, model.geometry, self._data)
-        kernels.centres(self._rotations, self._places, self._offset, self._middles)
-        first, second, influence = self._solid
-        near = kernels.near(
-            self._rotations, self._middles, self._half, self._radius, self._plane, first, second, influence,
-            self._found,
-        )  # fmt: skip
-        self._count = min(near, MEASURED)
-        found = self._found[: self._count]
+        found = self._broad.near()
+        self._count = len(found)
         for p in found.tolist():
             pin.computeDistance(model.geometry, self._data, p)
         if self._nearest is None:
@@ -156,11 +139,14 @@ class Clearance:
             nearest = np.array(copied).reshape(-1, 9)
         else:
             nearest = self._nearest
-        self.spare[:] = np.inf
+        self.spare[:] = np.inf if self._broad.known else np.nan
         least = kernels.gather(
-            nearest, found, model.bound, self._keys, self._of, self._distance, self._normal, self._points,
-            self.spare, model.promised,
+            nearest, found, model.bound, model.influence, self._keys, self._of, self._distance, self._normal,
+            self._points, self.spare, model.promised,
         )  # fmt: skip
+        self._broad.far(self._distance)
+        if self._on_fields:
+            kernels.centres(self._rotations, self._places, self._broad.offset, self._middles)
         for p, shape, field in self._on_fields:
             self._measure_field(p, shape, self._fields[field], field)
         self.checked = self._count
@@ -184,7 +170,7 @@ class Clearance:
         """One measured distance; the spare of a pair is that of its nearest points."""
         k, distance = self._count, result.min_distance
         self.spare[pair] = min(self.spare[pair], distance - self.model.bound[pair])
-        if k < MEASURED:
+        if k < len(self._keys):
             self._keys[k], self._of[k], self._distance[k] = key, pair, distance
             self._normal[k] = result.normal
             self._points[0, k], self._points[1, k] = result.getNearestPoint1(), result.getNearestPoint2()
@@ -222,7 +208,7 @@ class Clearance:
 
     def _measure_field(self, pair: int, shape: int, field: Field, number: int) -> None:
         item, reach = self.model.geometry.geometryObjects[shape], float(self.model.influence[pair])
-        low, high = field.local_box(self._middles[shape], self._rotations[shape], self._half[shape])
+        low, high = field.local_box(self._middles[shape], self._rotations[shape], self._broad.half[shape])
         pose = None
         for cell, prism in field.near(low, high, reach):
             pose = pose or coal.Transform3s(self._rotations[shape], self._places[shape])

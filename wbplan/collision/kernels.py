@@ -32,84 +32,14 @@ def centres(rotations: Any, places: Any, offset: Any, out: Any) -> None:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def apart(R: Any, ha: Any, S: Any, hb: Any, t: Any) -> float:
-    """A lower bound of the distance of two boxes with half edges ha, hb: the best of seven directions.
-
-    R and S are the boxes' rotations and t the way from the first one's middle to the other's.
-    """
-    best = -1.0e30
-    for axis in range(7):
-        if axis == 6:
-            length = np.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-            if length < 1e-12:
-                continue
-            x, y, z = t[0] / length, t[1] / length, t[2] / length
-        elif axis < 3:
-            x, y, z = R[0, axis], R[1, axis], R[2, axis]
-        else:
-            x, y, z = S[0, axis - 3], S[1, axis - 3], S[2, axis - 3]
-        gap = abs(x * t[0] + y * t[1] + z * t[2])
-        for k in range(3):
-            gap -= ha[k] * abs(x * R[0, k] + y * R[1, k] + z * R[2, k])
-            gap -= hb[k] * abs(x * S[0, k] + y * S[1, k] + z * S[2, k])
-        best = max(best, gap)
-    return best
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def near(
-    rotations: Any,
-    middles: Any,
-    half: Any,
-    radius: Any,
-    plane: Any,
-    first: Any,
-    second: Any,
-    influence: Any,
-    found: Any,
-) -> int:
-    """Numbers of the pairs that may be within their influence, into `found`; returns how many.
-
-    `plane` (G, 4): normal n and offset b of a half-space n x <= b, world; zero where the shape is none.
-    """
-    count = 0
-    for p in range(first.shape[0]):
-        a, b = first[p], second[p]
-        reach = influence[p]
-        if plane[b, 0] != 0.0 or plane[b, 1] != 0.0 or plane[b, 2] != 0.0:
-            gap = -plane[b, 3]
-            for i in range(3):
-                gap += plane[b, i] * middles[a, i]
-            if gap - radius[a] >= reach:
-                continue
-            for k in range(3):
-                along = 0.0
-                for i in range(3):
-                    along += plane[b, i] * rotations[a, i, k]
-                gap -= half[a, k] * abs(along)
-            if gap < reach:
-                found[count] = p
-                count += 1
-            continue
-        x, y, z = middles[b, 0] - middles[a, 0], middles[b, 1] - middles[a, 1], middles[b, 2] - middles[a, 2]
-        far = radius[a] + radius[b] + reach
-        if x * x + y * y + z * z >= far * far:
-            continue
-        if apart(rotations[a], half[a], rotations[b], half[b], (x, y, z)) < reach:
-            found[count] = p
-            count += 1
-    return count
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
 def gather(
-    nearest: Any, found: Any, bound: Any, keys: Any, pairs: Any, distance: Any, normal: Any, points: Any,
-    spare: Any, promised: Any,
+    nearest: Any, found: Any, bound: Any, influence: Any, keys: Any, pairs: Any, distance: Any, normal: Any,
+    points: Any, spare: Any, promised: Any,
 ) -> float:  # fmt: skip
     """Takes the results (P, 9), normal and points, of the pairs that were found.
 
     Returns:
-        The least distance of those that promise one.
+        The least distance of those that promise one and are within their influence.
     """
     least = np.inf
     for k in range(found.shape[0]):
@@ -122,7 +52,7 @@ def gather(
             gap += nearest[p, i] * (nearest[p, 6 + i] - nearest[p, 3 + i])
         distance[k] = gap
         spare[p] = gap - bound[p]
-        if promised[p]:
+        if promised[p] and gap <= influence[p]:  # what is further is not always looked at
             least = min(least, gap)
     return least
 

@@ -98,16 +98,30 @@ def _shapes_in_urdf(robot: Robot) -> Any:
             link.remove(visual)
         for mesh in link.iterfind("collision/geometry/mesh"):
             mesh.set("filename", str(robot.mesh_path(mesh.get("filename", ""))))
+    capsules = _as_cylinders(root)
     text = ElementTree.tostring(root, encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(robot.model, text, pin.GeometryType.COLLISION)
     if not geometry.ngeoms:
         raise SpecError(f"robot '{robot.name}': no link has a collision shape; no clearance can be kept")
     for item in geometry.geometryObjects:
+        if item.name in capsules:
+            item.geometry = coal.Capsule(item.geometry.radius, 2.0 * item.geometry.halfLength)
         if isinstance(item.geometry, coal.BVHModelBase):
             if not item.geometry.buildConvexHull(True, "Qt"):
                 raise SpecError(f"robot '{robot.name}': shape '{item.name}' has no volume")
             item.geometry = item.geometry.convex
     return geometry
+
+
+def _as_cylinders(root: ElementTree.Element) -> set[str]:
+    """Makes cylinders of capsules, which the reader of URDFs leaves out; the names of these shapes."""
+    found = set()
+    for link in root.findall("link"):
+        for i, shape in enumerate(link.findall("collision")):
+            for capsule in shape.iterfind("geometry/capsule"):
+                capsule.tag = "cylinder"
+                found.add(f"{link.get('name')}_{i}")
+    return found
 
 
 def robot_shapes(robot: Robot) -> Any:

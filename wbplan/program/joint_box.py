@@ -52,6 +52,7 @@ from numpy.typing import NDArray
 
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
+from wbplan.program.jerk_box import jerk_box, ways_to_rest
 
 Array = NDArray[np.float64]
 
@@ -175,50 +176,6 @@ def brake(gap: float, slowing: float) -> float:
     return found
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def jerk_box(
-    q: Any,
-    q_index: Any,
-    q_lower: Any,
-    q_upper: Any,
-    reach: Any,
-    most: Any,
-    jerk: Any,
-    share: Any,
-    rest: Any,
-    previous: Any,
-    older: Any,
-    left: float,
-    lower: Any,
-    upper: Any,
-) -> None:
-    """Narrow lower and upper (6 + n,) of the joints that have a bound on their jerk; see the module.
-
-    Shapes:
-        jerk: (n,) J; share: (n,) m; previous, older: (n,) the steps p and o.
-        rest: (n, 3) how many ticks before rest slowing down begins, and the bounds of x and s in the last.
-    """
-    for i in range(q_index.shape[0]):
-        if not jerk[i] < np.inf:
-            continue
-        here, p, m = q[q_index[i]], previous[i], share[i]
-        least, longest = p - most[i], p + most[i]
-        middle = min(max(2.0 * p - older[i], least), longest)
-        least, longest = max(least, middle - jerk[i]), min(longest, middle + jerk[i])
-        x_most = s_most = reach[i]
-        if left < rest[i, 0]:
-            growth = (1.0 - m) ** (1.0 - left)
-            x_most = min(x_most, growth * (rest[i, 1] - (left - 1.0) * m * rest[i, 2]))
-            s_most = min(s_most, growth * rest[i, 2])
-        up = min(x_most, (1.0 - m) * p + m * s_most)
-        down = max(-x_most, (1.0 - m) * p - m * s_most)
-        end = here - p + 2.0 * p / m  # where both lags end, for x = p
-        up = min(up, m * (q_upper[i] - here), p + m * m * (q_upper[i] - end))
-        down = max(down, m * (q_lower[i] - here), p + m * m * (q_lower[i] - end))
-        upper[6 + i] = min(max(up, least), longest)
-        lower[6 + i] = min(max(down, least), upper[6 + i])
-
-
 @final
 class JointBox:
     """The box of a phase's free joints, filled each tick for the steps before it.
@@ -235,6 +192,7 @@ class JointBox:
         left: ticks before the robot is to be at rest, this one included.
         reach, most: (n,) how far the speed limits let the joints go in a tick, and how much further or less
             far than in the last one.
+        jerky: whether there is a bound on jerk; lost: a joint that cannot stop in time within it, or -1.
         ticks: M of the last `fill`; factor: of the steps, when all joints slow down at once.
     """
 
@@ -250,7 +208,7 @@ class JointBox:
         self.ticks, self.factor = 1.0, 0.0
         self.reach, self.most, self.slowing, self._jerk = np.full((4, n), UNBOUNDED)
         self._led = phase.led[joints - 6]
-        self._limited, self._jerky = limits is not None, False
+        self._limited, self.jerky, self.lost = limits is not None, False, -1
         if limits is None:
             return
         self._q_lower = np.array(model.lowerPositionLimit)[self.q_index]
@@ -259,7 +217,7 @@ class JointBox:
         self.most = phase.acceleration[joints - 6] * dt**2
         self.slowing = BRAKING * phase.braking[joints - 6] * dt**2
         if phase.jerk is not None:
-            self._jerky = True
+            self.jerky = True
             self._jerk = phase.jerk[joints - 6] * dt**3
             self._share = np.minimum(
                 0.9, np.minimum(BRAKING * self._jerk / (2 * self.most), self.slowing / self.reach)
@@ -269,7 +227,7 @@ class JointBox:
                 raise SpecError(
                     f"phase '{phase.phase.name}': jerk of joint '{name}' is too small to come to rest"
                 )
-            self._rest = _ways_to_rest(self._share, self.reach, self.slowing)
+            self._rest = ways_to_rest(self._share, self.reach, self.slowing)
 
     def brake_as(self, acceleration: Array) -> None:
         """Count on no more for braking than these (n,) accelerations of the free joints [rad/s^2, m/s^2]."""
@@ -294,8 +252,8 @@ class JointBox:
             *limits, self.reach, self.most, self.slowing, p, self._led, left, self.ticks, self.factor, ease,
             self.lower, self.upper,
         )  # fmt: skip
-        if self._jerky:
-            jerk_box(
+        if self.jerky:
+            self.lost = jerk_box(
                 *limits, self.reach, self.most, self._jerk, self._share, self._rest, p, self.older, left,
                 self.lower, self.upper,
             )  # fmt: skip
@@ -363,33 +321,6 @@ class JointBox:
         p = float(previous[j])
         if abs(bound - p) >= self.most[j] * (1 - SAME) or abs(bound) >= self.slowing[j] * ticks * (1 - SAME):
             return "acceleration"
-        if self._jerky and abs(bound - 2 * p + older[j]) >= self._jerk[j] * (1 - SAME):
+        if self.jerky and abs(bound - 2 * p + older[j]) >= self._jerk[j] * (1 - SAME):
             return "jerk"
         return "speed" if abs(bound) >= self.reach[j] * (1 - SAME) else "position"
-
-
-def _ways_to_rest(share: Array, reach: Array, last: Array) -> Array:
-    """(n, 3) of `jerk_box`: steps fall to `last` when one tick is left, from any speed within reach.
-
-    Backwards from there s may grow by 1 / (1 - m) a tick, and x by as much less what s adds to it.
-    """
-    rest = np.zeros((len(share), 3))
-    for i, (m, v, x) in enumerate(zip(share, reach, last, strict=True)):
-        shrinks = -math.log1p(-m)
-
-        def fast_enough(t: float, m: float = m, v: float = v, x: float = x, rate: float = shrinks) -> bool:
-            growth = math.exp(min((t - 1) * rate, 300.0))
-            return growth * x / (2 * m * t) >= v and growth * x / 2 >= v
-
-        # Where x may be fast enough is known; the bound of s falls first, and is searched where it rises.
-        low = max(2.0, math.ceil(1.0 + math.log(max(2.0 * v / x, 1.0)) / shrinks))
-        if not fast_enough(low):
-            low, high = max(low, 1.0 / shrinks), max(2.0 * low, 2.0 / shrinks)
-            while not fast_enough(high):
-                high *= 2.0
-            while high - low > 1.0:
-                middle = math.floor(0.5 * (low + high))
-                low, high = (low, middle) if fast_enough(middle) else (middle, high)
-            low = math.ceil(high)
-        rest[i] = low, x, x / (2 * m * low)
-    return rest

@@ -295,11 +295,11 @@ class Stack:
         self.b[: self.rows.hard] -= self.hard_error[: self.rows.hard] * (self.easing == 3)
         return True
 
-    def begin(self, step: Array) -> None:
-        """Start after a step (nv,) [m, rad], and the same before it."""
+    def begin(self, step: Array, older: Array) -> None:
+        """Start after a step (nv,) [m, rad], and one (nv,) before it."""
         self.kinematics.differentiate()
         self.box.took(step[self.free], self.kinematics.com_jacobian @ step)
-        self.box.older[:] = self.box.previous
+        self.box.older[:] = older[self.free[6:]]
 
     def soft_damping(self) -> float:
         """The damping on H's diagonal for the errors of the last `measure`."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import trimesh
@@ -67,7 +68,7 @@ def robot_meshes(
         ModelError: the text is not a URDF, or a shape is not one.
         ViewError: a mesh file is missing or cannot be read.
     """
-    robot = _parse(urdf_text)
+    robot, capsules = _parse(urdf_text)
     colours = _named_colours(robot)
     folders = [urdf_dir or Path(), *(Path(folder) for folder in package_dirs)]
     seen = not collisions and any(link.visuals for link in robot.links)
@@ -75,19 +76,45 @@ def robot_meshes(
     meshes: list[LinkMesh] = []
     for link in robot.links:
         parts: dict[float, list[tuple[Any, Array]]] = {}
-        for shape in getattr(link, kind):
-            for mesh, rgba in _coloured(shape, link.name, colours, folders):
+        for i, shape in enumerate(getattr(link, kind)):
+            capsule = capsules.get((link.name, kind, i))
+            for mesh, rgba in _coloured(shape, link.name, colours, folders, capsule):
                 parts.setdefault(round(float(rgba[3]), 3), []).append((mesh, rgba[:3]))
         meshes += [_joined(link.name, part, opacity) for opacity, part in parts.items() if opacity > 0.0]
     return meshes
 
 
-def _parse(urdf_text: str) -> Any:
+def _parse(urdf_text: str) -> tuple[Any, dict[tuple[str | None, str, int], Any]]:
+    """The robot, and its capsules: see `_as_cylinders`."""
     settings = {"build_scene_graph": False, "load_meshes": False}
     try:
-        return yourdfpy.URDF.load(io.BytesIO(urdf_text.encode("utf-8")), **settings).robot
+        text, capsules = _as_cylinders(urdf_text)
+        return yourdfpy.URDF.load(io.BytesIO(text.encode("utf-8")), **settings).robot, capsules
     except Exception as error:
         raise ModelError(f"view: the robot's URDF cannot be read: {error}") from error
+
+
+def _as_cylinders(urdf_text: str) -> tuple[str, dict[tuple[str | None, str, int], Any]]:
+    """The URDF with cylinders for capsules, which yourdfpy refuses, and the meshes that stand for these.
+
+    They are named by their link, kind and number among the link's shapes of that kind.
+    """
+    root, found = ElementTree.fromstring(urdf_text), {}
+    for link in root.findall("link"):
+        for kind in ("visual", "collision"):
+            for i, shape in enumerate(link.findall(kind)):
+                for item in shape.iterfind("geometry/capsule"):
+                    radius, length = (float(item.get(key, "0")) for key in ("radius", "length"))
+                    found[link.get("name"), f"{kind}s", i] = _capsule(radius, length)
+                    item.tag = "cylinder"
+    return (ElementTree.tostring(root, encoding="unicode") if found else urdf_text), found
+
+
+def _capsule(radius: float, length: float) -> Any:
+    """About its middle, along z; `length` [m] is that between the balls' centres."""
+    mesh = trimesh.creation.capsule(height=length, radius=radius, count=[28, 28])
+    mesh.apply_translation(-mesh.bounds.mean(axis=0))
+    return mesh
 
 
 def _named_colours(robot: Any) -> dict[str, Any]:
@@ -103,7 +130,7 @@ def _named_colours(robot: Any) -> dict[str, Any]:
 
 
 def _coloured(
-    shape: Any, link: str, colours: dict[str, Any], folders: Sequence[Path]
+    shape: Any, link: str, colours: dict[str, Any], folders: Sequence[Path], capsule: Any = None
 ) -> list[tuple[Any, Array]]:
     """The meshes of one URDF shape in its link's frame, each with its red, green, blue and opacity."""
     material = getattr(shape, "material", None)
@@ -111,7 +138,7 @@ def _coloured(
     if material is not None:
         asked = material.color.rgba if material.color is not None else colours.get(material.name)
     found = []
-    for mesh in _triangles(shape.geometry, link, folders):
+    for mesh in _triangles(shape.geometry, link, folders) if capsule is None else [capsule]:
         if shape.origin is not None:
             mesh.apply_transform(shape.origin)
         rgba = asked if asked is not None else _own_colour(mesh)
