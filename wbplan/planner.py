@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, final
@@ -23,7 +24,7 @@ from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.why import Why
 from wbplan.fallback import Retries
 from wbplan.problem.script import Phase, Script
-from wbplan.reasons import why_at
+from wbplan.reasons import asked_of_support, why_at
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
 from wbplan.state import State
@@ -192,11 +193,12 @@ def plan(
         if phase.joint_limits is None:
             raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
-        loop = Loop(
-            robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies,
-            velocity=velocity, acceleration=acceleration, rest_at=(sum(lengths) - done) * dt,
-            braking=_least_braking(robot, script.phases[index:], q),
+        begun = partial(
+            Loop, robot, state=q, dt=dt, backend=backend, placed=dict(placed), roles=roles,
+            bodies=script.bodies, velocity=velocity, acceleration=acceleration,
+            rest_at=(sum(lengths) - done) * dt, braking=_least_braking(robot, script.phases[index:], q),
         )  # fmt: skip
+        loop = begun(phase=phase)
         _promises_hold(loop, phase)
         recorder.begin(index, loop, placed, done * dt)
         loops.append((done * dt, loop))
@@ -208,7 +210,8 @@ def plan(
             try:
                 tick = retries.step(loop, (done + k) * dt)
             except SolveError as error:
-                said = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into {error}"
+                more = asked_of_support(loop, begun, ticks, error)
+                said = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into {error}{more}"
                 kept = None
                 with contextlib.suppress(WbplanError):  # forces that nobody can give: then nothing is kept
                     kept = planned(said) if recorder.cut(index, loop, (done + k) * dt) else None
