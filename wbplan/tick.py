@@ -26,7 +26,7 @@ from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.active import Active, HeldBack
 from wbplan.explain.replay import Replay
 from wbplan.explain.why import Why, keep_goals
-from wbplan.paths import number, vector
+from wbplan.paths import ask, number, vector
 from wbplan.problem.bodies import Body
 from wbplan.problem.script import Phase
 from wbplan.program.diagnose import solve_error
@@ -252,7 +252,7 @@ class Loop:
         for target in self.compiled.frame_targets:
             if target.root != WORLD or target.label.startswith("contact("):
                 continue
-            first = target.path.at(float(times[0]))
+            first = ask(target.path, float(times[0]))
             if not isinstance(first, pin.SE3) and np.shape(first) != (3,):
                 continue
             points, rotations = sample(target.path, times)

@@ -15,6 +15,7 @@ import pytest
 import wbplan as wb
 from wbplan import cli
 from wbplan.bundle import Bundle
+from wbplan.cli import commands
 
 Refused = Callable[..., str]
 Call = Callable[..., Any]
@@ -270,14 +271,14 @@ def test_a_bundle_replaced_while_it_is_simulated_gets_no_verdict(
     wbplan: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert wbplan("run", "sway.py", "--out", "a").code == 0
-    real = cli.replay
+    real = commands.replay
 
     def replay(bundle: Bundle, **asked: object) -> object:
         done = real(bundle, **asked)
         assert cli.main(["run", "sway.py", "--out", "a", "--set", "sway=0.005"]) == 0
         return done
 
-    monkeypatch.setattr(cli, "replay", replay)
+    monkeypatch.setattr(commands, "replay", replay)
     ran = wbplan("simulate", "a")
     assert ran.code == 2
     assert "was replaced while it was simulated" in ran.err

@@ -53,13 +53,13 @@ def _change(rng: random.Random, tree: ast.Module) -> None:
         if calls:
             _change_call(rng, rng.choice(calls))
     elif kind == 6:
-        names: Any = rng.choice([n for n in nodes if isinstance(n, ast.Name)])
+        names: Any = rng.choice([n for n in nodes if isinstance(n, ast.Name)] or [ast.Name("f")])
         names.id = rng.choice(NAMES)
     elif kind == 7:
         _change_parameter(rng, rng.choice([n for n in nodes if isinstance(n, ast.arguments)]))
     elif kind == 8:
         pairs = [n for n in nodes if isinstance(n, ast.List | ast.Tuple) and n.elts]
-        items = rng.choice(pairs).elts
+        items = rng.choice(pairs).elts if pairs else [ast.Constant(0)]
         items.append(copy.deepcopy(rng.choice(items))) if chance(rng, 0.5) else items.pop()
     else:
         calls = [n for n in nodes if isinstance(n, ast.Call) and n.args]

@@ -175,7 +175,9 @@ def _mesh(name: str, folders: Sequence[Path]) -> Path:
     for path in [Path(plain), *(f / part for f in folders for part in (plain, *plain.split("/", 1)[1:]))]:
         if path.is_file():
             return path.resolve()
-    raise Unreadable(f"mesh '{name}' is not in {', '.join(map(str, folders)) or 'the bundle'}")
+    raise Unreadable(
+        f"mesh '{name}' is not in {', '.join(map(str, folders)) or 'the bundle'}; say where it is"
+    )
 
 
 def _add(spec: Any, item: Obstacle) -> None:

@@ -40,6 +40,9 @@ from wbplan.view import Server, play
 
 DONE, BROKEN, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 HOST = "127.0.0.1"
+Meshes = Annotated[
+    list[Path] | None, typer.Option(metavar="FOLDER", help="Where the robot's meshes are; may be repeated.")
+]
 
 app = typer.Typer(
     name="wbplan",
@@ -172,7 +175,8 @@ def run(
         )
         planned.save(folder)
     saved = Bundle.read(folder)  # what was written is what is checked
-    checked = recompute(saved)
+    meshes = (robot.urdf_path.parent, *robot.package_dirs)
+    checked = recompute(saved, folders=meshes)
     console = _console()
     print_plan(saved, console)
     console.print(checked.table())
@@ -181,16 +185,17 @@ def run(
     )
     checked.require()
     if view:
-        play(saved, HOST, package_dirs=(robot.urdf_path.parent, *robot.package_dirs))
+        play(saved, HOST, package_dirs=meshes)
 
 
 @app.command()
 def check(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A bundle, as `wbplan run` writes it.")],
+    meshes: Meshes = None,
 ) -> None:
     """Recompute every promise of a bundle from its files; exit code 1 where one is broken."""
     bundle = Bundle.read(folder)
-    checked = recompute(bundle)
+    checked = recompute(bundle, folders=meshes or ())
     console = _console()
     console.print(checked.table())
     if reason := bundle.plan["report"].get("incomplete"):
@@ -208,18 +213,19 @@ def simulate(
     view: Annotated[
         bool, typer.Option("--view", help="Serve plan and simulated robot in Meshcat until Ctrl-C.")
     ] = False,
+    meshes: Meshes = None,
 ) -> None:
     """Replay a bundle with contact, friction and servos; exit code 1 where it does not stand."""
     bundle = Bundle.read(folder)
     with _progress_bar(str(folder)) as progress:
-        done = replay(bundle, trials=trials, seed=seed, progress=progress)
+        done = replay(bundle, trials=trials, seed=seed, progress=progress, folders=meshes or ())
     if Bundle.read(folder).plan != bundle.plan:
         raise BundleError(f"{folder}: was replaced while it was simulated; simulate it again")
     report = done.save(folder)
     print_simulation(done, _console())
     print(f"written to {report}")
     if view:
-        play(bundle, HOST, ghost=ghost_of(done))
+        play(bundle, HOST, ghost=ghost_of(done), package_dirs=meshes or ())
     if not done.stands:
         raise PlanFalls(str(done.verdict))
 
@@ -234,9 +240,10 @@ def view(
     collisions: Annotated[
         bool, typer.Option("--collisions", help="Also draw the collision shapes and the nearest pair.")
     ] = False,
+    meshes: Meshes = None,
 ) -> None:
     """Serve a bundle in Meshcat until Ctrl-C."""
-    play(Bundle.read(folder), host, port, collisions=collisions)
+    play(Bundle.read(folder), host, port, collisions=collisions, package_dirs=meshes or ())
 
 
 @app.command()

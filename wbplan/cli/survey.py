@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbplan.checks import check
 from wbplan.errors import SpecError
 from wbplan.gaits import (
     CLOSING,
@@ -169,7 +168,7 @@ def measured(given: Setting, walked: Walk, planned: Plan, distance: float, secon
     course, first = walked.schedule.course, walked.steps[1].begin
     whole = distance >= 2.0 * gait.stride(stroke) - 1e-9  # then it goes a cycle and more at full speed
     beat = next(s.duration for s in walked.steps if s.swing)
-    trajectory, report = planned.trajectory, check(planned.bundle)
+    trajectory, report = planned.trajectory, planned.check()
     moved = trajectory.q[-1, :2] - trajectory.q[0, :2]
     return Walked(
         planned.robot.name,

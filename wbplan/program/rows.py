@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from wbplan.compiled.aims import ComTarget
 from wbplan.compiled.kinematics import Kinematics
 from wbplan.compiled.phase import WORLD, CompiledPhase, FrameTarget
-from wbplan.paths import checked
+from wbplan.paths import ask, checked
 from wbplan.program import kernels
 from wbplan.sampling import sample
 
@@ -179,7 +179,7 @@ class Rows:
         self._ahead = None
         self.motion[:] = 0.0
         for path, place, turn, com in self._paths:
-            value = checked(path.at(t), f"{type(path).__name__} at {t:.4g} s")
+            value = checked(ask(path, t), f"{type(path).__name__} at {t:.4g} s")
             pose = isinstance(value, pin.SE3)
             if place is not None:
                 self.position_goal[place] = value.translation if pose else value
