@@ -94,8 +94,7 @@ class Plan:
         Raises:
             BundleError: the folder cannot be written.
         """
-        from wbplan.plots import forces as forceplots
-        from wbplan.plots import overview as plots
+        from wbplan import plots
         from wbplan.view import write_html
 
         return self.bundle.write(
@@ -103,7 +102,7 @@ class Plan:
             extras={
                 "scene.html": lambda path: write_html(self.bundle, path, package_dirs=self._folders),
                 "plots.png": lambda path: plots.save(self.bundle, path),
-                "forces.png": lambda path: forceplots.save(self.bundle, path),
+                "forces.png": lambda path: plots.save_forces(self.bundle, path),
             },
         )
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from wbplan.gaits.gait import Gait
 from wbplan.gaits.margins import best_margin, cycle_margins
+from wbplan.pictures import blank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,11 +30,9 @@ def cycle_figure(
         heading: of travel [rad].
         title: of the figure.
     """
-    from matplotlib.figure import Figure
-
     columns = min(COLUMNS, len(gaits))
     rows = -(-len(gaits) // columns)
-    figure = Figure(figsize=(5.0 * columns, 3.0 * rows + 0.4), layout="constrained")
+    figure = blank(5.0 * columns, 3.0 * rows + 0.4)
     grid = figure.add_gridspec(2 * rows, columns, height_ratios=[2.0, 1.0] * rows)
     ahead = np.array([np.cos(heading), np.sin(heading)])
     for k, (gait, stance, stroke) in enumerate(gaits):
