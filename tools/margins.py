@@ -37,7 +37,7 @@ def main(trials: int, picture: Path) -> None:
         margins.append(margin)
         survivals.append(done.survival)
         stands.append(done.stands)
-    margin_figure(margins, survivals, stands).savefig(picture, dpi=110)
+    margin_figure(margins, survivals, stands).savefig(picture)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,9 @@ from wbplan.errors import SpecError
 
 Array = NDArray[np.float64]
 
+#: Numbers beyond this, in any unit, count as infinite: squares and products of them have to be numbers too.
+LARGEST = 1e30
+
 #: Points nearer to a line than this share of the points' extent count as lying on it.
 FLAT = 1e-10
 EPSILON = float(np.finfo(np.float64).eps)
@@ -20,6 +23,11 @@ EPSILON = float(np.finfo(np.float64).eps)
 NEARLY = 0.01
 #: Coordinates [m] from here on are not those of a polygon: their products would overflow.
 FAR = 1e100
+
+
+def within_reckoning(numbers: Array) -> bool:
+    """Whether all are finite, and none beyond `LARGEST`."""
+    return bool((np.abs(numbers) <= LARGEST).all())
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wbplan.errors import SpecError
+from wbplan.errors import SpecError, WbplanError
+from wbplan.geometry import LARGEST, within_reckoning
 from wbplan.splines import Spline
 
 Array = NDArray[np.float64]
@@ -43,14 +44,6 @@ class AsIs:
 
 
 AS_IS: Final = AsIs()
-
-#: Numbers beyond this, in any unit, count as infinite: squares and products of them have to be numbers too.
-LARGEST = 1e30
-
-
-def within_reckoning(numbers: Array) -> bool:
-    """Whether all are finite, and none beyond `LARGEST`."""
-    return bool((np.abs(numbers) <= LARGEST).all())
 
 
 def checked(value: object, what: str) -> Value:
@@ -174,6 +167,17 @@ class Path(abc.ABC):
     def constant(self) -> bool:
         """Whether the target never moves."""
         return False
+
+
+def ask(path: Path, t: float) -> Value:
+    """The path's value at time `t` [s]; what somebody's own path raises is a `SpecError`."""
+    try:
+        return path.at(t)
+    except WbplanError:
+        raise
+    except Exception as error:
+        name, raised = type(path).__name__, f"{type(error).__name__}: {error}"
+        raise SpecError(f"{name} at {t:.4g} s raised {raised}") from error
 
 
 @final

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wbplan.errors import SpecError
-from wbplan.paths import Line, MinJerk, Path, Swing, Value, Waypoints, checked
+from wbplan.paths import Line, MinJerk, Path, Swing, Value, Waypoints, ask, checked
 
 Array = NDArray[np.float64]
 Samples = tuple[Array, Array]
@@ -33,7 +33,7 @@ def _one_by_one(path: Path, times: Array) -> Samples:
     """Any path, a user's own too: what it answers is checked here, once for each time."""
     points, rotations = np.zeros((len(times), 3)), np.tile(np.eye(3), (len(times), 1, 1))
     for k, t in enumerate(times):
-        value = checked(path.at(float(t)), f"{type(path).__name__} at {t:.4g} s")
+        value = checked(ask(path, float(t)), f"{type(path).__name__} at {t:.4g} s")
         if isinstance(value, pin.SE3):
             points[k], rotations[k] = value.translation, value.rotation
         elif np.shape(value) == (3, 3):

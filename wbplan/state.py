@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.errors import SpecError, listing
-from wbplan.paths import LARGEST
+from wbplan.geometry import LARGEST
 
 QUATERNION_TOLERANCE = 1e-6
 """How far a quaternion's norm may be from 1 to be taken for a rounding error and renormalised."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import tempfile
 from pathlib import Path
 from types import ModuleType
 
@@ -213,6 +214,24 @@ def test_a_folder_that_may_not_be_written_is_named(good: Bundle, tmp_path: Path)
     (tmp_path / "locked").mkdir(mode=0o500)
     with pytest.raises(BundleError, match="locked"):
         good.write(tmp_path / "locked" / "plan")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only the superuser may be somebody else for a while")
+def test_a_folder_that_somebody_else_may_not_write_is_named(good: Bundle) -> None:
+    """The earlier bundle stays as it is, and can still be read."""
+    with tempfile.TemporaryDirectory() as place:
+        target = good.write(Path(place) / "plan")
+        for path in (Path(place), target):
+            path.chmod(0o755)
+        before = tree(Path(place))
+        os.seteuid(65534)
+        try:
+            with pytest.raises(BundleError, match="Permission denied"):
+                good.write(target)
+            assert Bundle.read(target).plan["task"] == good.plan["task"]
+        finally:
+            os.seteuid(0)
+        assert tree(Path(place)) == before
 
 
 def test_an_error_of_the_disk_is_named(good: Bundle, tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import wbplan as wb
-from wbplan import cli
 from wbplan.bundle import Bundle
 from wbplan.cli import commands
 
@@ -244,8 +243,6 @@ def test_a_taken_port(refused: Refused, bundle: Path) -> None:
 
 STRETCHED = '''"""Stretched: the body rises until the legs are at their end."""
 import wbplan as wb
-from wbplan import cli
-from wbplan.bundle import Bundle
 ROBOT = "mana"
 def script(robot):
     stand = robot.state("stand")
@@ -275,7 +272,7 @@ def test_a_bundle_replaced_while_it_is_simulated_gets_no_verdict(
 
     def replay(bundle: Bundle, **asked: object) -> object:
         done = real(bundle, **asked)
-        assert cli.main(["run", "sway.py", "--out", "a", "--set", "sway=0.005"]) == 0
+        assert commands.main(["run", "sway.py", "--out", "a", "--set", "sway=0.005"]) == 0
         return done
 
     monkeypatch.setattr(commands, "replay", replay)

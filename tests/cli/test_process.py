@@ -10,10 +10,12 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
+
+import wbplan as wb
 
 ROOT = Path(__file__).resolve().parents[2]
 # Long enough to be interrupted, and says when planning is about to begin.
@@ -47,9 +49,13 @@ def started(*args: str, cwd: Path) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
-def test_an_interrupted_run_leaves_nothing(sent: signal.Signals, tmp_path: Path) -> None:
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda s: s.name)
+def test_a_run_that_is_stopped_leaves_nothing_but_what_was_there(
+    sent: signal.Signals, tmp_path: Path
+) -> None:
     (tmp_path / "long.py").write_text(LONG, encoding="utf-8")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "plan.json").write_text("earlier", encoding="utf-8")
     with started("run", "long.py", cwd=tmp_path) as process:
         end = time.monotonic() + 60
         while not (tmp_path / "begun").exists():
@@ -59,9 +65,14 @@ def test_an_interrupted_run_leaves_nothing(sent: signal.Signals, tmp_path: Path)
         time.sleep(0.5)
         process.send_signal(sent)
         _, err = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert err == "wbplan: interrupted\n"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["begun", "long.py"]
+    if sent is signal.SIGKILL:
+        assert process.returncode == -signal.SIGKILL
+    else:
+        assert process.returncode == 130
+        assert err == "wbplan: interrupted\n"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["begun", "long.py", "out"]
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["plan.json"]
+    assert (tmp_path / "out" / "plan.json").read_text(encoding="utf-8") == "earlier"
 
 
 def test_a_usage_error_ends_with_2_and_one_line(tmp_path: Path) -> None:
@@ -119,3 +130,20 @@ def test_a_disk_that_is_full_leaves_the_earlier_bundle(tmp_path: Path) -> None:
     assert "cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
     assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()} == before
+
+
+def _into_plan(task: str, cwd: Path) -> AbstractContextManager[subprocess.Popen[str]]:
+    return started("run", f"{task}.py", "--out", "plan", cwd=cwd)
+
+
+def test_two_runs_into_one_folder_leave_one_whole_bundle(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        text = LONG.replace("3000.0", "0.1").replace('"long"', f'"{name}"')
+        (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+    with _into_plan("one", tmp_path) as one, _into_plan("two", tmp_path) as two:
+        for process in (one, two):
+            assert process.wait(timeout=120) == 0, process.communicate()
+    bundle = wb.Bundle.read(tmp_path / "plan")
+    assert bundle.plan["phases"][0]["name"] == bundle.plan["task"] in ("one", "two")
+    assert wb.check(bundle).ok
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["begun", "one.py", "plan", "two.py"]

@@ -16,6 +16,18 @@ from wbplan.taskfile import Parameter, find_task, glance, load_task
 Refused = Callable[..., str]
 HEAD = '"""A task."""\nimport wbplan as wb\nROBOT = "legarm_hexapod"\n'
 
+# A path of the task's own, that raises while it is planned.
+RAISES = """
+class Raises(wb.Path):
+    def at(self, t):
+        return 1 / 0 if {when} else robot_place
+def script(robot):
+    global robot_place
+    robot_place = robot.state("stand").pose("body").translation
+    feet = [wb.Contact(foot, friction=0.7) for foot in robot.feet.values()]
+    return wb.Script(wb.Phase("a", contacts=feet, soft=[wb.PositionTask("body", Raises())], duration=0.1))
+"""
+
 
 @pytest.mark.parametrize(
     ("source", "expected"),
@@ -52,6 +64,11 @@ HEAD = '"""A task."""\nimport wbplan as wb\nROBOT = "legarm_hexapod"\n'
             "    return wb.Script(wb.Phase('a', hard=[wb.ComTask((float('nan'), 0.0, 0.3))]))\n",
             ["task.py, line 5", "nan"],
         ),
+        (
+            HEAD + RAISES.format(when="t > 0.0"),
+            ["Raises at 0.01 s raised ZeroDivisionError"],
+        ),
+        (HEAD + RAISES.format(when="True"), ["Raises at 0 s raised ZeroDivisionError"]),
         (
             HEAD.replace("legarm_hexapod", "no_robot") + "def script(robot): ...\n",
             ["no_robot", "legarm_hexapod"],

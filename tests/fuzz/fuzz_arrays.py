@@ -71,12 +71,12 @@ def _retyped(rng: random.Random, array: Any) -> Any:
 
 def _reshaped(rng: random.Random, array: Any) -> Any:
     choices = [
-        array.T, array[None], array.ravel(), array[..., None], array[:0], np.zeros(0), np.zeros(()),
+        array.T, array[None], array.ravel(), array[..., None], np.zeros(0), np.zeros(()),
         np.zeros((0, 3)), np.zeros((2, 2, 2)), np.asfortranarray(array),
         np.zeros((1_000_000,)), np.zeros((3, 0)),
     ]  # fmt: skip
     if array.ndim:
-        choices += [array[:-1], array[1:], array[::-1], np.concatenate([array, array[-1:]])]
+        choices += [array[:0], array[:-1], array[1:], array[::-1], np.concatenate([array, array[-1:]])]
     if array.ndim > 1:
         choices += [array[:, :-1], array[:, ::-1], np.hstack([array, array[:, :1]])]
     return rng.choice(choices)

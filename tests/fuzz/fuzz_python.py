@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import copy
 import random
 from typing import Any
@@ -22,7 +23,8 @@ def mutate_python(rng: random.Random, source: str) -> bytes:
         return scarred(rng, source.encode())
     tree = ast.parse(source)
     for _ in range(rng.choice((1, 1, 1, 2, 2, 3, 5))):
-        _change(rng, tree)
+        with contextlib.suppress(IndexError):  # nothing of that kind is left
+            _change(rng, tree)
     try:
         return ast.unparse(ast.fix_missing_locations(tree)).encode("utf-8", "replace")
     except (ValueError, TypeError, AttributeError, RecursionError):
@@ -53,7 +55,7 @@ def _change(rng: random.Random, tree: ast.Module) -> None:
         if calls:
             _change_call(rng, rng.choice(calls))
     elif kind == 6:
-        names: Any = rng.choice([n for n in nodes if isinstance(n, ast.Name)])
+        names: Any = rng.choice([n for n in nodes if isinstance(n, ast.Name)] or [ast.Name("f")])
         names.id = rng.choice(NAMES)
     elif kind == 7:
         _change_parameter(rng, rng.choice([n for n in nodes if isinstance(n, ast.arguments)]))

@@ -175,7 +175,7 @@ def _places(value: Any, found: list[tuple[Any, Any]]) -> list[tuple[Any, Any]]:
 def _change_json(rng: random.Random, value: Any) -> Any:
     places = _places(value, [])
     if not places or chance(rng, 0.005):
-        return rng.choice(NASTY_JSON)
+        return copy.deepcopy(rng.choice(NASTY_JSON))
     # Long lists (a region's corners) must not take all the attention.
     container, key = rng.choice(places)
     inside, name = rng.choice(places)
@@ -193,8 +193,8 @@ def _change_json(rng: random.Random, value: Any) -> Any:
             )
     elif kind == 4 and isinstance(container, dict):
         container[rng.choice(["clearance", "region", "joint_acceleration", "normal", "com", "x", ""])] = (
-            rng.choice(NASTY_JSON)
+            copy.deepcopy(rng.choice(NASTY_JSON))
         )
     else:
-        container[key] = rng.choice(NASTY_JSON)
+        container[key] = copy.deepcopy(rng.choice(NASTY_JSON))
     return value

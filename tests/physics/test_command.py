@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wbplan import cli
+from wbplan.cli import commands as cli
 from wbplan.cli.commands import main
 from wbplan.physics import ghost_of, simulate
 from wbplan.view import page

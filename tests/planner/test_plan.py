@@ -248,7 +248,7 @@ def test_an_interrupt_while_saving_leaves_nothing_behind(
     kept = tmp_path / "kept"
     short.bundle.write(kept)
     before = {path.name: path.read_bytes() for path in kept.iterdir()}
-    monkeypatch.setattr("wbplan.plots.overview.save", stop)
+    monkeypatch.setattr("wbplan.plots.save", stop)
     for folder in (tmp_path / "new" / "out", kept):
         with pytest.raises(KeyboardInterrupt):
             short.save(folder)

@@ -12,8 +12,11 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from wbplan import gaits
 from wbplan.bundle import NO_MARGIN, Bundle
 from wbplan.errors import BundleError
+from wbplan.pictures import DPI
+from wbplan.plots import force_figure
 from wbplan.plots import overview as plots
 
 
@@ -68,12 +71,16 @@ def test_the_com_s_path_starts_and_ends_where_it_does(good: Bundle, drawing: Fig
 def test_the_file_is_a_picture_and_the_same_each_time(good: Bundle, tmp_path: Path) -> None:
     first = plots.save(good, tmp_path / "one.png")
     picture = imread(first)
-    assert picture.shape[:2] == (int(plots.SIZE[1] * plots.DPI), int(plots.SIZE[0] * plots.DPI))
+    assert picture.shape[:2] == (int(plots.SIZE[1] * DPI), int(plots.SIZE[0] * DPI))
     assert len(np.unique((picture[::7, ::7, :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 50
     assert plots.save(good, tmp_path / "two.png").read_bytes() == first.read_bytes()
 
 
-def test_a_notebook_gets_a_picture_without_pyplot(drawing: Figure) -> None:
+def test_a_notebook_gets_a_picture_without_pyplot(drawing: Figure, good: Bundle) -> None:
+    legs = [f"leg{k}" for k in range(6)]
+    gait = gaits.cycle_figure([gaits.tripod(legs)], gaits.regular_stance(legs), heading=0.0, stroke=0.1)
+    for other in (force_figure(good), gait):
+        assert other._repr_png_().startswith(b"\x89PNG")
     assert drawing._repr_png_().startswith(b"\x89PNG")
 
 

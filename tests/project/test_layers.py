@@ -12,6 +12,7 @@ import pytest
 LAYERS = [
     "errors",
     "version",
+    "pictures",
     "geometry",
     "splines",
     "paths",

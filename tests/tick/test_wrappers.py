@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import threading
 import weakref
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -163,3 +164,27 @@ def test_a_given_joint_may_be_a_hair_beyond_its_limit(legarm: wb.Robot) -> None:
     for _ in range(60):
         tick = loop.step()
     assert tick.q[legarm.joint_index(joint)[0]] == pytest.approx(np.pi / 2, abs=1e-12)
+
+
+def test_what_only_the_looks_say_twice_does_not_disturb_placo(legarm: wb.Robot, tmp_path: Path) -> None:
+    """Its reader refuses two materials of one name, which Pinocchio's does not see."""
+    twice = '<material name="grey"><color rgba="1 1 1 1"/></material>' * 2
+    text = legarm.urdf_text.replace("</robot>", f"{twice}</robot>")
+    path = tmp_path / "twice.urdf"
+    path.write_text(text, encoding="utf-8")
+    assert legarm.srdf_path is not None
+    path.with_suffix(".srdf").write_text(legarm.srdf_path.read_text(encoding="utf-8"), encoding="utf-8")
+    robot = wb.load_robot(path, package_dirs=[legarm.urdf_path.parent])
+    phase = wb.Phase("still", soft=[wb.PostureTask()], limits=[wb.JointLimits()])
+    assert wb.Loop(robot, phase, robot.state("stand"), dt=0.01, backend="placo").step().q.size
+
+
+def test_a_robot_that_placo_cannot_read_is_refused(legarm: wb.Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(*_: object) -> None:
+        raise ValueError("no\nrobot")
+
+    monkeypatch.setattr("placo.RobotWrapper", refuses)
+    monkeypatch.setattr("wbplan.backends.placo.WRAPPERS", Wrappers())
+    phase = wb.Phase("still", soft=[wb.PostureTask()], limits=[wb.JointLimits()])
+    with pytest.raises(wb.SpecError, match="'placo' cannot read robot 'legarm_hexapod': no robot"):
+        wb.Loop(legarm, phase, legarm.state("stand"), dt=0.01, backend="placo")

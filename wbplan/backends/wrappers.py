@@ -16,6 +16,7 @@ import placo
 from lxml import etree
 
 from wbplan.compiled.phase import CompiledPhase
+from wbplan.errors import SpecError
 
 _LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit")
 
@@ -51,7 +52,7 @@ class Wrappers:
             robot = idle.pop() if idle else None
             self.made += robot is None
         if robot is None:
-            robot = placo.RobotWrapper("", int(placo.Flags.ignore_collisions), text)
+            robot = _made(text, phase)
         weakref.finalize(owner, self._back.append, (text, robot)).atexit = False
         _renew(robot, phase)
         return robot
@@ -59,6 +60,14 @@ class Wrappers:
 
 #: Those of this process.
 WRAPPERS = Wrappers()
+
+
+def _made(text: str, phase: CompiledPhase) -> Any:
+    try:
+        return placo.RobotWrapper("", int(placo.Flags.ignore_collisions), text)
+    except (ValueError, RuntimeError) as error:
+        said = " ".join(str(error).split())[:120]
+        raise SpecError(f"backend 'placo' cannot read robot '{phase.robot.name}': {said}") from error
 
 
 def _renew(robot: Any, phase: CompiledPhase) -> None:
@@ -79,7 +88,7 @@ def _renew(robot: Any, phase: CompiledPhase) -> None:
 def _urdf_with_carried(phase: CompiledPhase) -> str:
     """The URDF without its looks, and with each carried body as a link fixed to its holder, without mass."""
     root = etree.fromstring(phase.robot.urdf_text.encode(), etree.XMLParser(resolve_entities=False))
-    for element in list(root.iter("visual", "collision")):
+    for element in list(root.iter("visual", "collision", "material")):
         element.getparent().remove(element)
     for held in phase.held:
         name = held.body.name

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SpecError
+from wbplan.paths import ask
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ def check_given(compiled: CompiledPhase, velocity: Array, dt: float) -> None:
     for driven in compiled.driven:
         before, bound = float(velocity[6 + driven.joint]), float(compiled.acceleration[driven.joint])
         ticks = 1 if driven.path.constant else max(1, int(np.ceil(compiled.phase.duration / dt - 1e-9)))
-        places = np.array([float(driven.path.at(k * dt)) for k in range(ticks + 1)])
+        places = np.array([float(ask(driven.path, k * dt)) for k in range(ticks + 1)])
         change = np.abs(np.diff([before, *(np.diff(places) / dt)])) / dt
         worst = int(change.argmax())
         if change[worst] > bound + SLACK:

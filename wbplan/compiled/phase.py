@@ -16,7 +16,7 @@ from wbplan.compiled.acceleration import acceleration_bounds, jerk_bounds, stopp
 from wbplan.compiled.aims import AscentTarget, ComTarget, ascent_target, balance_target
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes
-from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, checked, kind_of
+from wbplan.paths import NUMBER, POINT, POSE, Hold, MinJerk, Path, ask, checked, kind_of
 from wbplan.problem.bodies import Body, Held, frame_number, standing, with_carried
 from wbplan.problem.objectives import BalanceTask, ManipulabilityTask
 from wbplan.problem.script import Phase, unknown
@@ -231,7 +231,7 @@ def _bound(path: Path, here: Any, what: str, takes: tuple[str, ...]) -> Path:
     except SpecError as error:
         raise SpecError(f"{what}: {error}") from None
     # Paths of other people's classes say what they are by what they give.
-    check_kind(bound.kind or kind_of(checked(bound.at(0.0), what)), what, takes)
+    check_kind(bound.kind or kind_of(checked(ask(bound, 0.0), what)), what, takes)
     return bound
 
 
@@ -259,7 +259,7 @@ def _driven(robot: Robot, phase: Phase, state: State, now: Mapping[str, str | No
     for joint, path in phase.driven.items():
         what, here = f"{at}.driven['{joint}']", state.joint(joint)
         path = _bound(path, np.asarray(here), what, (NUMBER,))
-        first = float(path.at(0.0))
+        first = float(ask(path, 0.0))
         if path.constant:
             path = _towards(here, first, phase)
         elif abs(first - here) > 1e-6:
@@ -281,7 +281,7 @@ def _check_given(robot: Robot, phase: Phase, paths: Mapping[str, Path]) -> None:
     times = np.linspace(0.0, phase.duration, 201)
     too_fast: list[tuple[float, str, str]] = []
     for joint, path in paths.items():
-        values = np.array([float(path.at(t)) for t in times])
+        values = np.array([float(ask(path, t)) for t in (times[:2] if path.constant else times)])
         lower, upper = robot.joint_limits(joint)
         low, high = min(lower, values[0]) - 1e-9, max(upper, values[0]) + 1e-9
         held = (values >= low) & (values <= high) if phase.joint_limits is not None else np.isfinite(values)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from wbplan.pictures import blank
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,21 +20,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SIZE, DPI = (14.0, 12.0), 100
+SIZE = (14.0, 12.0)  #: [inch]
 INK, FAINT, BOUND = "#22303c", "#8a97a3", "#c0392b"
 POINTS = 2500  #: samples of a line
 
 
-def png(simulation: Simulation) -> bytes:
-    """The picture of a simulation as PNG data."""
-    return _png(figure(simulation))
-
-
 def figure(simulation: Simulation) -> Figure:
     """Draws a simulation over the plan's time."""
-    from matplotlib.figure import Figure
-
-    drawn = Figure(figsize=SIZE, layout="constrained")
+    drawn = blank(*SIZE)
     drawn.suptitle(f"{simulation.bundle.plan.get('task')}: {simulation.verdict}", color=INK, wrap=True)
     axes = drawn.subplots(4, 2)
     m, motion = simulation.measures, simulation.motion
@@ -78,9 +72,7 @@ def margin_figure(margins: Sequence[float], survivals: Sequence[Survival], stand
         survivals: of each plan's trials.
         stands: whether each plan stood undisturbed.
     """
-    from matplotlib.figure import Figure
-
-    drawn = Figure(figsize=(8.0, 5.0), layout="constrained")
+    drawn = blank(8.0, 5.0)
     axis = drawn.subplots()
     for margin, survival, stood in zip(margins, survivals, stands, strict=True):
         low, high = survival.interval
@@ -96,15 +88,6 @@ def margin_figure(margins: Sequence[float], survivals: Sequence[Survival], stand
     axis.set_title("does the planned margin tell what stands?  x: falls undisturbed", color=INK, fontsize=10)
     axis.grid(alpha=0.3)
     return drawn
-
-
-def _png(drawn: Any) -> bytes:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(drawn)
-    data = io.BytesIO()
-    drawn.savefig(data, format="png", dpi=DPI)
-    return data.getvalue()
 
 
 def _lines(axis: Axes, time: Array, values: Array, names: Sequence[str], title: str) -> None:

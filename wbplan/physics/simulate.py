@@ -24,6 +24,7 @@ from wbplan.physics.run import Record, run
 from wbplan.physics.scene import Scene, from_mujoco, scene_of
 from wbplan.physics.trials import LADDER, Progress, Spread, Survival, survey
 from wbplan.physics.verdict import Measures, Verdict, judge, measure, summary
+from wbplan.pictures import png
 from wbplan.robot import load_robot
 
 Array = NDArray[np.float64]
@@ -97,11 +98,11 @@ class Simulation:
         Raises:
             PhysicsError: the folder cannot be written.
         """
-        from wbplan.physics.figures import png
+        from wbplan.physics.figures import figure
 
         target = Path(folder)
         text = json.dumps(_plain(self.report()), indent=1, allow_nan=False) + "\n"
-        for name, data in ((PICTURE, png(self)), (REPORT, text.encode())):
+        for name, data in ((PICTURE, png(figure(self))), (REPORT, text.encode())):
             part = target / f".{name}.{os.getpid()}.part"
             try:
                 part.write_bytes(data)

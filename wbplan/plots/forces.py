@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.bundle import NO_MARGIN, Bundle
-from wbplan.errors import BundleError
-from wbplan.plots.overview import BOUND, DPI, FAINT, INK, png
+from wbplan.pictures import blank, write
+from wbplan.plots.overview import BOUND, FAINT, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,12 +29,7 @@ def save(bundle: Bundle, path: str | Path) -> Path:
     Raises:
         BundleError: the file cannot be written.
     """
-    path = Path(path)
-    try:
-        path.write_bytes(png(figure(bundle)))
-    except OSError as error:
-        raise BundleError(f"{path}: cannot be written: {error.strerror or error}") from error
-    return path
+    return write(figure(bundle), path)
 
 
 def figure(bundle: Bundle) -> Figure:
@@ -44,9 +39,7 @@ def figure(bundle: Bundle) -> Figure:
     that each joint gives; the margin in metres, and the largest push on the CoM in newtons that the contacts
     bear whatever its direction.
     """
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=SIZE, dpi=DPI, layout="constrained", facecolor="white")
+    drawing = blank(*SIZE)
     panels = drawing.subplots(4, 1, sharex=True, height_ratios=[1.1, 1.0, 1.2, 1.0])
     _feet(panels[0], panels[1], bundle)
     _joints(panels[2], bundle)

@@ -5,20 +5,19 @@ matplotlib is imported when a picture is made, not before, and nothing of pyplot
 
 from __future__ import annotations
 
-import io
-import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbplan.bundle import NO_MARGIN, Bundle
-from wbplan.errors import BundleError, SpecError
+from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
+from wbplan.pictures import blank, write
 from wbplan.plots.measures import draw_measures
 
 if TYPE_CHECKING:
@@ -27,9 +26,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SIZE, DPI = (15.0, 11.0), 110  #: [inch], dots an inch
+SIZE = (15.0, 11.0)  #: [inch]
 TIME = "viridis"  #: colour map of time
 INK, FAINT, BOUND = "#22303c", "#8a97a3", "#c0392b"
+FEW = 12  #: support polygons that can be told apart
+DASHED = (0, (4, 3))
 MOST_LINES = 8  #: tasks with a line of their own in a panel
 FLOOR = 1e-8  #: errors below it are drawn at it: nothing is learnt from less
 
@@ -40,12 +41,7 @@ def save(bundle: Bundle, path: str | Path) -> Path:
     Raises:
         BundleError: the file cannot be written.
     """
-    path = Path(path)
-    try:
-        path.write_bytes(png(figure(bundle)))
-    except OSError as error:
-        raise BundleError(f"{path}: cannot be written: {error.strerror or error}") from error
-    return path
+    return write(figure(bundle), path)
 
 
 def figure(bundle: Bundle) -> Figure:
@@ -54,15 +50,7 @@ def figure(bundle: Bundle) -> Figure:
     Left: the CoM's path in the support polygons, seen from above, and the base's pose. Right, over time:
     the margin and what was promised, the tasks' errors, and every joint within its limits.
     """
-    from matplotlib.figure import Figure
-
-    class Plan(Figure):
-        """A figure that needs no pyplot to be shown."""
-
-        def _repr_png_(self) -> bytes:
-            return png(self)
-
-    drawing = Plan(figsize=SIZE, dpi=DPI, layout="constrained", facecolor="white")
+    drawing = blank(*SIZE)
     engine: Any = drawing.get_layout_engine()
     engine.set(w_pad=0.06, h_pad=0.05)
     columns = drawing.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
@@ -79,17 +67,6 @@ def figure(bundle: Bundle) -> Figure:
     _errors(panels[1], bundle, ("orientation", "joints"), "rad")
     _joints(drawing, panels[2], bundle)
     return drawing
-
-
-def png(drawing: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    file, canvas = io.BytesIO(), cast(Any, FigureCanvasAgg(drawing))
-    with warnings.catch_warnings():  # labels of absurd numbers leave no room
-        warnings.simplefilter("ignore", UserWarning)
-        canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
-    return file.getvalue()
 
 
 # --------------------------------------------------------------------------------------------------- balance
@@ -119,29 +96,21 @@ def _top_view(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
 
     motion = bundle.trajectory
     clock = Normalize(motion.time[0], motion.time[-1])
-    drawn: set[tuple[float, ...]] = set()
     named: list[tuple[str, Array]] = []
+    outlines: dict[tuple[float, ...], tuple[dict[str, Any], HalfPlanes]] = {}
     for phase, feet, polygon in _polygons(bundle):
         for contact, foot in zip(phase["contacts"], feet, strict=True):
             if all(contact["frame"] != n or np.linalg.norm(foot - p) > 5e-3 for n, p in named):
                 named.append((contact["frame"], foot))
-        if polygon is None:
-            continue
-        key = (round(phase["margin"], 4), *np.round(polygon.vertices, 3).ravel())
-        if key in drawn:
-            continue
-        drawn.add(key)
-        color = colormaps[TIME](clock(phase["start"]))
-        axes.fill(
-            *polygon.vertices.T, facecolor=(*color[:3], 0.05), edgecolor=(*color[:3], 0.8), linewidth=1.2
-        )
-        inset = polygon.inset(max(phase["margin"], 0.0))
-        if phase["margin"] > 0.0 and len(inset):
-            axes.fill(
-                *inset.T, facecolor="none", edgecolor=(*color[:3], 0.7), linewidth=0.9, linestyle=(0, (4, 3))
-            )
+        if polygon is not None:
+            key = (round(phase["margin"], 4), *np.round(polygon.vertices, 3).ravel())
+            outlines.setdefault(key, (phase, polygon))
+    faint = min(1.0, FEW / max(len(outlines), 1))
+    for phase, polygon in outlines.values():
+        _outline(axes, phase, polygon, colormaps[TIME](clock(phase["start"])), faint)
     axes.plot([], [], color=FAINT, linewidth=1.2, label="support polygon, by phase")
-    axes.plot([], [], color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)), label="promised margin inside it")
+    if faint == 1.0:
+        axes.plot([], [], color=FAINT, linewidth=0.9, linestyle=DASHED, label="promised margin inside it")
     _feet(axes, named)
     path = motion.com[:, :2]
     pieces = LineCollection(
@@ -167,6 +136,15 @@ def _top_view(drawing: Figure, axes: Axes, bundle: Bundle) -> None:
     bar = drawing.colorbar(pieces, cax=axes.inset_axes((1.02, 0.0, 0.025, 1.0)))
     bar.set_label("time [s]")
     bar.outline.set_visible(False)
+
+
+def _outline(axes: Axes, phase: dict[str, Any], polygon: HalfPlanes, color: Any, faint: float) -> None:
+    """A support polygon, and the promised margin in it unless there are too many to tell apart."""
+    edge: Any = {"edgecolor": (*color[:3], 0.8 * faint), "linewidth": 0.4 + 0.8 * faint}
+    axes.fill(*polygon.vertices.T, facecolor=(*color[:3], 0.05 * faint), **edge)
+    inset = polygon.inset(max(phase["margin"], 0.0))
+    if faint == 1.0 and phase["margin"] > 0.0 and len(inset):
+        axes.fill(*inset.T, facecolor="none", edgecolor=(*color[:3], 0.7), linewidth=0.9, linestyle=DASHED)
 
 
 def _feet(axes: Axes, named: list[tuple[str, Array]]) -> None:

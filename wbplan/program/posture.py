@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.compiled.phase import JointTarget
-from wbplan.paths import MinJerk, number
+from wbplan.paths import MinJerk, ask, number
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class Posture:
         self.pull = 1.0 - float(np.exp(-target.gain * dt))
         self.goal, self.step = goal, step
         for j, path in target.paths:
-            goal[column[j]] = float(path.at(0.0))
+            goal[column[j]] = float(ask(path, 0.0))
         moving = [(column[j], path) for j, path in target.paths if not path.constant]
         # Ramps of least jerk are what scripts use most: all of them at once.
         ramps = [(k, path) for k, path in moving if isinstance(path, MinJerk)]
@@ -49,7 +49,7 @@ class Posture:
             s = np.minimum(t / self._duration, 1.0)
             self.goal[self._ramps] = self._from + self._way * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
         for k, path in self._others:
-            self.goal[k] = number(path.at(t), f"{self.label} at {t:.4g} s", "a finite joint position")
+            self.goal[k] = number(ask(path, t), f"{self.label} at {t:.4g} s", "a finite joint position")
         self.step[:] = 0.0
 
     def advance(self, t: float) -> None:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from wbplan.collision import CAPACITY, SHARE, Clearance, collision_model
 from wbplan.compiled.kinematics import Kinematics
 from wbplan.compiled.phase import CompiledPhase
-from wbplan.paths import number
+from wbplan.paths import ask, number
 from wbplan.program import kernels
 from wbplan.program.ascent import Ascent
 from wbplan.program.blocks import RowBlock, edge_names, name_rows
@@ -98,7 +98,7 @@ class Stack:
             for j, path in t.paths
             if t.weight[j] > 0
         ]
-        self.hard_joint_goal = np.array([float(path.at(0.0)) for _, path, _ in self.hard_joints])
+        self.hard_joint_goal = np.array([float(ask(path, 0.0)) for _, path, _ in self.hard_joints])
         self.n_hard = rows.hard + len(self.hard_joints)
         self.A, self.b = np.zeros((self.n_hard, nf)), np.zeros(self.n_hard)
         for i, (joint, _, _) in enumerate(self.hard_joints):
@@ -192,7 +192,7 @@ class Stack:
         """Put all targets where they are at time `t` [s]."""
         self.rows.aim(t)
         for i, (_, path, _) in enumerate(self.hard_joints):
-            self.hard_joint_goal[i] = float(path.at(t))
+            self.hard_joint_goal[i] = float(ask(path, t))
         for posture in self.postures:
             posture.aim(t)
 
@@ -205,10 +205,10 @@ class Stack:
             posture.advance(t)
         q = self.kinematics.q
         for k, driven in self._moving_driven:
-            goal = number(driven.path.at(t), f"driven joint at {t:.4g} s", "a finite position")
+            goal = number(ask(driven.path, t), f"driven joint at {t:.4g} s", "a finite position")
             self.driven_step[k] = goal - q[7 + driven.joint]
         for i, (joint, path, _) in enumerate(self.hard_joints):
-            self.hard_joint_goal[i] = number(path.at(t), f"hard posture at {t:.4g} s", "a finite position")
+            self.hard_joint_goal[i] = number(ask(path, t), f"hard posture at {t:.4g} s", "a finite position")
             self.hard_error[self.rows.hard + i] = self.hard_joint_goal[i] - q[7 + joint]
 
     def measure(self, q: Array) -> None:
