@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from wbplan.backends import make_backend
 from wbplan.compiled.given import check_given
 from wbplan.compiled.phase import WORLD, CompiledPhase, compile_phase
-from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.errors import SolveError, SpecError
 from wbplan.explain.active import Active, HeldBack
 from wbplan.explain.replay import Replay
 from wbplan.explain.why import Why, keep_goals
@@ -299,7 +299,7 @@ class Loop:
             stack.advance(self.t)
             solution = self._solve()
             new = self._keep(q, solution.step, before)
-        except WbplanError:
+        except BaseException:  # Ctrl-C too: in a notebook somebody may go on
             stack.aim(self.t)
             stack.measure(q)
             raise

@@ -20,10 +20,10 @@ from wbplan.taskfile import load_task
 TASK = load_task("walk")
 
 
-def planned(robot: str, dt: float = 0.02, **settings: Any) -> wb.Plan:
+def planned(robot: str, dt: float = 0.02, backend: str = "proxqp", **settings: Any) -> wb.Plan:
     loaded = wb.load_robot(robot)
     values = TASK.values([f"{key}={value}" for key, value in settings.items()])
-    plan = wb.plan(loaded, TASK.script(loaded, values), dt=dt)
+    plan = wb.plan(loaded, TASK.script(loaded, values), dt=dt, backend=backend)
     report = plan.check()
     assert report.ok, [row for row in report.rows if not row.held]
     assert all(phase["clearance"] == 0.005 for phase in plan.bundle.phases)
@@ -81,9 +81,10 @@ def test_modes(robot: str, mode: str, along: tuple[int, int]) -> None:
     assert way == pytest.approx(size * np.array(along), abs=1e-3)
 
 
+@pytest.mark.parametrize("backend", ["proxqp", "placo"])
 @pytest.mark.parametrize("robot", sorted(catalog.robots()))
-def test_robots(robot: str) -> None:
-    plan = planned(robot, dt=0.01, cycles=0.5)
+def test_robots(robot: str, backend: str) -> None:
+    plan = planned(robot, dt=0.01, backend=backend, cycles=0.5)
     way, _ = moved(plan)
     assert way[0] > 0.01
     assert way[1] == pytest.approx(0.0, abs=1e-3)

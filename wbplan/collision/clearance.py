@@ -145,10 +145,10 @@ class Clearance:
             self._points, self.spare, model.promised,
         )  # fmt: skip
         self._broad.far(self._distance)
-        if self._on_fields:
+        if self._on_fields and self._broad.known:
             kernels.centres(self._rotations, self._places, self._broad.offset, self._middles)
-        for p, shape, field in self._on_fields:
-            self._measure_field(p, shape, self._fields[field], field)
+            for p, shape, field in self._on_fields:
+                self._measure_field(p, shape, self._fields[field], field)
         self.checked = self._count
         count = self._count
         if self._places_all is not self._places:
