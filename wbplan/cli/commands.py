@@ -27,7 +27,7 @@ from wbplan.cli.printing import print_plan, print_robot, print_simulation
 from wbplan.cli.survey import setting, survey, table
 from wbplan.errors import BundleError, CheckFailed, GaitError, PlanFalls, SolveError, SpecError, WbplanError
 from wbplan.gaits import cycle_figure, gaits_for, mode_named
-from wbplan.papers import DIFFERS, report, summary
+from wbplan.papers import DIFFERS, figure_16, report, summary
 from wbplan.physics import ghost_of
 from wbplan.physics import simulate as replay
 from wbplan.planner import plan
@@ -284,8 +284,14 @@ def papers(
     paper: Annotated[
         str | None, typer.Argument(help="mana, zheng, hexpiderix, hiphant or zhuang; all where not given.")
     ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="A PNG file for the margins of a change of gait beside Zheng's figure 16."),
+    ] = None,
 ) -> None:
     """What the papers print about kinematics beside what comes out here; exit code 1 where that differs."""
+    if figure is not None:
+        figure_16().savefig(figure, dpi=110)
     rows = report(paper)
     _console().print(summary([row.cells() for row in rows]))
     counts = {

@@ -99,7 +99,11 @@ def walk(
             manner = replace(manner, step_time=_step_time(done, manner))
             done = planned(1.0, manner, done)
     except GaitError as error:
-        raise _with_a_way_out(error, lambda share: planned(share, manner), gait.stride(stroke)) from None
+        still = best_margin(gait, stance.feet, (0.0, 0.0))
+        wider = manner.margin / still if manner.margin is not None and still > 0.0 else 0.0
+        raise _with_a_way_out(
+            error, lambda share: planned(share, manner), gait.stride(stroke), wider
+        ) from None
     return replace(done, gait=gait, stride=done.speed * gait.cycle * manner.beat)
 
 
@@ -173,8 +177,17 @@ def _step_time(done: Walk, manner: Manner) -> float:
     return GRAIN * math.ceil(least / GRAIN)
 
 
-def _with_a_way_out(error: GaitError, planned: Callable[[float], Walk], stride: float) -> GaitError:
-    """The same error with the longest stride that would hold."""
+def _with_a_way_out(
+    error: GaitError, planned: Callable[[float], Walk], stride: float, wider: float
+) -> GaitError:
+    """The same error with the longest stride that would hold, or the stance.
+
+    Args:
+        error: the error.
+        planned: share of the stride -> the walk.
+        stride: [m].
+        wider: a stance so many times as wide has the margin asked, the body standing still.
+    """
     if error.stride is not None or "step_time" in str(error):
         return error
     low, high = 0.0, 1.0
@@ -190,6 +203,8 @@ def _with_a_way_out(error: GaitError, planned: Callable[[float], Walk], stride: 
     way = (
         f"a stride of {low * stride:.3f} m (of {stride:.3f} m) would hold"
         if low > 0.0
+        else f"no shorter stride would hold; with short ones a stance over {wider:.2f} times as wide would"
+        if wider > 1.0
         else "no shorter stride would hold: widen the stance, ask for less margin, or pause between steps"
     )
     return GaitError(f"{error}; {way}", step=error.step, margin=error.margin, stride=low * stride or None)
