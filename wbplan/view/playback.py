@@ -378,7 +378,7 @@ class _Playback:
 
     def _posed(self, path: str, poses: Array) -> Array:
         """A node at poses (N, 7), hidden where they are not known; returns those that are."""
-        known: Bools = (np.abs(poses) <= LARGEST).all(axis=1)  # NaN is not
+        known: Bools = np.abs(poses).max(axis=1) <= LARGEST  # NaN is not
         if known.any():
             held = poses[np.maximum.accumulate(np.where(known, np.arange(len(poses)), int(np.argmax(known))))]
             self._moving(path, held[:, :3], held[:, 3:])
