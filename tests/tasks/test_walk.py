@@ -91,6 +91,13 @@ def test_robots(robot: str, backend: str) -> None:
     assert np.nanmin(plan.trajectory.margin) > 0.0
 
 
+@pytest.mark.parametrize("how", [{"mode": "crab"}, {"heading": 90}])
+def test_thighs_pass_the_body_sideways_too(how: dict[str, Any]) -> None:
+    """HIphanT's turn close by the belts beside its hull: the distance costs no margin."""
+    way, _ = moved(planned("hiphant", cycles=0.5, **how))
+    assert np.hypot(*way) > 0.1
+
+
 def test_the_ground_is_a_balls_radius_below_its_middle() -> None:
     """Of a foot whose frame is the middle of its ball; feet that land sink no further in than ticks go."""
     soles = {name: Walker(wb.load_robot(name)).sole for name in catalog.robots()}
