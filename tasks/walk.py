@@ -110,7 +110,7 @@ def script(
 def _rolling(radius: float, length: float, relief: float) -> wb.HeightField:
     """Waves of 2.2 and 2.6 radii, wide enough for the whole walk; level with the floor at the start."""
     side = 3.0 * radius + length
-    grid = np.linspace(-side, side, 2 * math.ceil(4.0 * side / radius) + 1)
+    grid = np.linspace(-side, side, 2 * math.ceil(4.0 * side / radius))
     x, y = np.meshgrid(grid, grid, indexing="ij")
     waves = np.sin(2.0 * np.pi * x / (2.2 * radius)) * np.cos(2.0 * np.pi * y / (2.6 * radius))
     return wb.HeightField(grid, grid, relief * waves)
