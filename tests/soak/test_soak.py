@@ -101,6 +101,25 @@ def test_the_watch_sees_a_joint_that_starts_too_fast(
     assert not any("acceleration" in what for what in slower.see(_tick(state, q, 0.01)))
 
 
+def test_the_watch_sees_a_jerk_and_takes_no_excuse_for_speed(
+    standing: tuple[wb.Robot, wb.Phase, wb.State],
+) -> None:
+    robot, _, state = standing
+    phase = wb.Phase("gently", limits=[wb.JointLimits(speed=0.05, jerk=500.0)])
+    q = np.array(state.q)
+    q[8] += 5e-3
+    tick = _tick(state, q, 0.01)
+    tick.warning = "speed not yet within its limit: a joint"
+    broken = " ".join(Watch(robot, phase, state.q, 0.01, {}).see(tick))
+    assert "jerk" in broken
+    assert "speed" in broken  # the joint was at rest
+    moving = np.zeros(robot.model.nv)
+    moving[7] = 0.5
+    broken = " ".join(Watch(robot, phase, state.q, 0.01, {}, velocity=moving).see(tick))
+    assert "speed" not in broken  # it came as fast
+    assert "jerk" not in broken
+
+
 def test_the_watch_sees_links_that_come_too_near(standing: tuple[wb.Robot, wb.Phase, wb.State]) -> None:
     robot, _, state = standing
     phase = wb.Phase("apart", limits=[wb.SelfCollision(distance=0.2, influence=0.3)])
