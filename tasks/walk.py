@@ -90,7 +90,9 @@ def script(
         wb.Ground() if terrain == "flat" else _rolling(stance.radius, length, relief or 0.05 * stance.height)
     )
     ground = wb.Obstacle("ground", shape, (0.0, 0.0, -walker.sole), friction=friction)
-    obstacles = wb.Obstacles([ground], clearance)
+    # A height field is many triangles: those are looked at that legs of the robot's size may come near.
+    influence = 0.05 if terrain == "flat" else min(0.05, clearance + 0.05 * stance.height)
+    obstacles = wb.Obstacles([ground], clearance, influence)
     apart: tuple[Any, ...] = (wb.SelfCollision(clearance), obstacles) if clearance > 0.0 else ()
     if terrain != "flat" and not apart:
         apart = (obstacles,)
@@ -108,7 +110,7 @@ def script(
 def _rolling(radius: float, length: float, relief: float) -> wb.HeightField:
     """Waves of 2.2 and 2.6 radii, wide enough for the whole walk; level with the floor at the start."""
     side = 3.0 * radius + length
-    grid = np.linspace(-side, side, 2 * math.ceil(8.0 * side / radius) + 1)
+    grid = np.linspace(-side, side, 2 * math.ceil(4.0 * side / radius))
     x, y = np.meshgrid(grid, grid, indexing="ij")
     waves = np.sin(2.0 * np.pi * x / (2.2 * radius)) * np.cos(2.0 * np.pi * y / (2.6 * radius))
     return wb.HeightField(grid, grid, relief * waves)
