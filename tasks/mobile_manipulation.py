@@ -118,7 +118,7 @@ def script(
     def reach(k: int, path: wb.Path, **more: Any) -> dict[str, Any]:
         """Fields of step k: the hand on a path, the body beside its way."""
         free = wb.gaits.beside_way(walker, made.course, made.steps[k].begin, height)
-        return {"soft": (hand(path),), "body": free, **more}
+        return {"hard": (hand(path),), "soft": (), "body": free, **more}
 
     def fingers(value: float, seconds: float) -> dict[str, wb.Path]:
         return {f"{ARM}_finger_{letter}": wb.MinJerk(wb.AS_IS, value, seconds) for letter in "ab"}

@@ -37,6 +37,7 @@ def script(
     height: float | None = None,
     radius: float | None = None,
     margin: float | None = None,
+    closing: float = wb.gaits.CLOSING,
     clearance: float = 0.005,
     friction: float = 0.7,
     terrain: Literal["flat", "rolling"] = "flat",
@@ -46,7 +47,8 @@ def script(
 
     Args:
         robot: with three legs or more.
-        gait: its name; 'tripod' of six legs, 'crawl' of four, 'wave' of others where not given.
+        gait: its name; 'tripod' of six legs, 'crawl' of four, 'wave' of others where not given. In '4+1',
+            '3+2' and 'mixture' a hexapod walks on five and holds the sixth up.
         mode: which way the legs point and the robot goes: crab and mixed1 along x, ant and mixed2 along y;
             'free' leaves the legs as in the robot's pose 'stand'.
         path: a straight line, an arc that the body follows, or a turn on the spot.
@@ -60,20 +62,23 @@ def script(
         lift: how high feet rise [m]; a tenth of the body's height where not given.
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
-        margin: stability margin kept throughout [m]; half of the largest where not given.
+        margin: stability margin kept throughout [m]; half of the largest where not given, or a quarter.
+        closing: share by which five feet close the gap of the sixth; at 1 they are a regular pentagon.
         clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do
             robots without collision shapes.
         friction: of the feet on the ground [-].
         terrain: 'rolling' is a height field of hills and hollows, a few feet apart.
         relief: of their tops over the mean height [m]; a twentieth of the body's height where not given.
     """
-    walker = wb.gaits.Walker(robot)
+    walker = wb.gaits.walker_for(robot, gait)
     way = wb.gaits.mode_named(mode)
-    stance = walker.stance(lean=way.lean, radius=radius, height=height)
-    rise = 0.1 * stance.height if lift is None else lift
-    stance, easy = wb.gaits.comfortable(walker, stance, rise, adjust=height is None)
-    stroke = (easy if terrain == "flat" else 0.5 * easy) if stroke is None else stroke
     course = way.heading + math.radians(heading)
+    even = closing if walker.raised else 0.0
+    stance = walker.stance(lean=way.lean, radius=radius, height=height, even=even)
+    rise = 0.1 * stance.height if lift is None else lift
+    if stroke is None or height is None:
+        stance, easy = wb.gaits.comfortable(walker, stance, rise, adjust=height is None, heading=course)
+        stroke = (easy if terrain == "flat" else 0.5 * easy) if stroke is None else stroke
     made = wb.gaits.gait_for(walker, gait, stance, course, stroke)
     length = cycles * made.stride(stroke) if distance is None else distance
     if path == "spot":
@@ -85,7 +90,9 @@ def script(
         wb.Ground() if terrain == "flat" else _rolling(stance.radius, length, relief or 0.05 * stance.height)
     )
     ground = wb.Obstacle("ground", shape, (0.0, 0.0, -walker.sole), friction=friction)
-    obstacles = wb.Obstacles([ground], clearance)
+    # A height field is many triangles: those are looked at that legs of the robot's size may come near.
+    influence = 0.05 if terrain == "flat" else min(0.05, clearance + 0.05 * stance.height)
+    obstacles = wb.Obstacles([ground], clearance, influence)
     apart: tuple[Any, ...] = (wb.SelfCollision(clearance), obstacles) if clearance > 0.0 else ()
     if terrain != "flat" and not apart:
         apart = (obstacles,)
@@ -96,22 +103,14 @@ def script(
         friction=friction,
         limits=apart if walker.solid else (),
     )
-    heights = wb.gaits.over(obstacles.terrain, -walker.sole)
-    return wb.gaits.walk(
-        walker,
-        made,
-        track,
-        stroke,
-        stance=stance,
-        manner=manner,
-        ground=lambda x, y: heights(x, y) + walker.sole,
-    ).script
+    feet = wb.gaits.over(obstacles.terrain, -walker.sole, walker.sole)
+    return wb.gaits.walk(walker, made, track, stroke, stance=stance, manner=manner, ground=feet).script
 
 
 def _rolling(radius: float, length: float, relief: float) -> wb.HeightField:
     """Waves of 2.2 and 2.6 radii, wide enough for the whole walk; level with the floor at the start."""
     side = 3.0 * radius + length
-    grid = np.linspace(-side, side, 2 * math.ceil(8.0 * side / radius) + 1)
+    grid = np.linspace(-side, side, 2 * math.ceil(4.0 * side / radius))
     x, y = np.meshgrid(grid, grid, indexing="ij")
     waves = np.sin(2.0 * np.pi * x / (2.2 * radius)) * np.cos(2.0 * np.pi * y / (2.6 * radius))
     return wb.HeightField(grid, grid, relief * waves)

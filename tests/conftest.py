@@ -11,6 +11,7 @@ from hypothesis import settings
 from rich.console import Console
 
 from wbplan.bundle import Bundle
+from wbplan.cli.survey import Walked, table
 from wbplan.papers import summary
 
 # The same examples each time: a red run can be run again, and a slow machine is no failure.
@@ -42,11 +43,17 @@ def good(machine: ModuleType) -> Bundle:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What the papers print beside what came out in this run, where their tests ran."""
+    """What the papers print beside what came out in this run, and the figures of all gaits walked in it."""
     reports = [r for outcome in ("passed", "failed") for r in terminalreporter.stats.get(outcome, [])]
-    rows = [tuple(cells) for r in reports for key, cells in r.user_properties if key == "paper"]
-    if rows:
-        console = Console(width=150, markup=False, highlight=False, emoji=False)
-        with console.capture() as text:
+    found = [(key, value) for r in reports for key, value in r.user_properties]
+    rows = [tuple(cells) for key, cells in found if key == "paper"]
+    walks = [Walked(**fields) for key, fields in found if key == "gait"]
+    console = Console(width=150, markup=False, highlight=False, emoji=False)
+    with console.capture() as text:
+        if rows:
             console.print(summary(sorted(rows, key=lambda cells: cells[0])))
+        if walks:
+            walks.sort(key=lambda row: (row.robot, row.mode != "free", row.mode, row.gait))
+            console.print(table(walks, "gaits as walked in these tests"))
+    if rows or walks:
         terminalreporter.write(f"\n{text.get()}")

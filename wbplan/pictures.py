@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -28,14 +30,22 @@ def blank(width: float, height: float) -> Figure:
     return Picture(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
 
 
+@contextmanager
+def unruffled() -> Iterator[None]:
+    """Absurd numbers are drawn as well as can be: their labels leave no room, their scales overflow."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        warnings.simplefilter("ignore", RuntimeWarning)
+        yield
+
+
+@unruffled()
 def png(drawing: Figure) -> bytes:
     """A figure as the bytes of a PNG file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     file, canvas = io.BytesIO(), cast(Any, FigureCanvasAgg(drawing))
-    with warnings.catch_warnings():  # labels of absurd numbers leave no room
-        warnings.simplefilter("ignore", UserWarning)
-        canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
+    canvas.print_png(file, metadata={"Software": None})  # without the version: the same file each time
     return file.getvalue()
 
 

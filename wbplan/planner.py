@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, final
@@ -17,13 +18,13 @@ from numpy.typing import NDArray
 
 from wbplan.bundle import Bundle, Trajectory
 from wbplan.checks import CheckReport, check
-from wbplan.compiled.acceleration import acceleration_bounds, braking_bounds
+from wbplan.compiled.acceleration import acceleration_bounds, braking_bounds, braking_kind
 from wbplan.compiled.phase import CompiledPhase
 from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.why import Why
 from wbplan.fallback import Retries
 from wbplan.problem.script import Phase, Script
-from wbplan.reasons import why_at
+from wbplan.reasons import asked_of_support, why_at
 from wbplan.recorder import Recorder
 from wbplan.robot import Robot
 from wbplan.state import State
@@ -191,11 +192,12 @@ def plan(
         if phase.joint_limits is None:
             raise SpecError(f"phase '{phase.name}'.limits: a plan keeps joint limits; add wb.JointLimits()")
     for index, (phase, ticks) in enumerate(zip(script.phases, lengths, strict=True)):
-        loop = Loop(
-            robot, phase, q, dt, backend=backend, placed=placed, roles=roles, bodies=script.bodies,
-            velocity=velocity, acceleration=acceleration, rest_at=(sum(lengths) - done) * dt,
-            braking=_least_braking(robot, script.phases[index:], q),
+        begun = partial(
+            Loop, robot, state=q, dt=dt, backend=backend, placed=dict(placed), roles=roles,
+            bodies=script.bodies, velocity=velocity, acceleration=acceleration,
+            rest_at=(sum(lengths) - done) * dt, braking=_least_braking(robot, script.phases[index:], q),
         )  # fmt: skip
+        loop = begun(phase=phase)
         _promises_hold(loop, phase)
         recorder.begin(index, loop, placed, done * dt)
         loops.append((done * dt, loop))
@@ -207,7 +209,8 @@ def plan(
             try:
                 tick = retries.step(loop, (done + k) * dt)
             except SolveError as error:
-                said = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into {error}"
+                more = asked_of_support(loop, begun, ticks, error)
+                said = f"at {(done + k) * dt:.2f} s of the plan, {k * dt:.2f} s into {error}{more}"
                 kept = None
                 with contextlib.suppress(WbplanError):  # forces that nobody can give: then nothing is kept
                     kept = planned(said) if recorder.cut(index, loop, (done + k) * dt) else None
@@ -258,9 +261,19 @@ def _interrupts_held() -> Iterator[None]:
 
 def _least_braking(robot: Robot, phases: Sequence[Phase], q: Array) -> Array:
     """(n,) what each joint can count on for braking in all of these phases [rad/s^2, m/s^2]."""
-    found = [braking_bounds(robot, phase, acceleration_bounds(robot, phase, q)) for phase in phases]
+    kinds: list[tuple[object, ...]] = []
+    alike = [phase for phase in phases if not _seen(braking_kind(phase), kinds)]
+    found = [braking_bounds(robot, phase, acceleration_bounds(robot, phase, q)) for phase in alike]
     least: Array = np.min(found, axis=0)
     return least
+
+
+def _seen(kind: tuple[object, ...], kinds: list[tuple[object, ...]]) -> bool:
+    """Whether a kind is among those seen before; it is from now on."""
+    if kind in kinds:
+        return True
+    kinds.append(kind)
+    return False
 
 
 def _inside_limits(robot: Robot, q: Array) -> None:

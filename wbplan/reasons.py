@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.bundle import Trajectory
-from wbplan.errors import SpecError
+from wbplan.errors import SolveError, SpecError, WbplanError
 from wbplan.explain.why import Why
 from wbplan.paths import number
+from wbplan.problem.limits import SupportPolygon
+from wbplan.problem.tasks import FrameTask
 from wbplan.tick import Loop, Tick
 
 Array = NDArray[np.float64]
@@ -59,6 +63,50 @@ class Notes:
         why = worst(tick, loop)
         if why is not None:
             self.found.append({"time": t, "until": self._next, "task": why.task, "text": str(why)})
+
+
+def asked_of_support(loop: Loop, begun: Callable[..., Loop], ticks: int, error: SolveError) -> str:
+    """How far hard tasks would take the CoM, where a support polygon stands against them.
+
+    The phase is gone through once more without its polygon: the least margin then is what they ask for.
+
+    Args:
+        loop: at the last state that keeps every promise.
+        begun: the keyword `phase` -> its loop, from the state in which the phase began.
+        ticks: of the phase.
+        error: what said that no step exists.
+
+    Returns:
+        A sentence with what is asked and what is possible, [m]; nothing where no support is in the way.
+    """
+    phase, polygon, model = loop.compiled.phase, loop.compiled.polygon, loop.compiled.model
+    against = next(
+        (c.name for c in error.clashes if c.name.startswith(("support polygon", "support region"))), None
+    )
+    if against is None or polygon is None or phase.margin is None:
+        return ""
+    limits = tuple(limit for limit in phase.limits if not isinstance(limit, SupportPolygon))
+    free = begun(phase=replace(phase, limits=limits))
+    root = next(f.name for f in model.frames if f.parentJoint == 1 and f.name != "root_joint")
+    given = [t.label for t in phase.soft_tasks if isinstance(t, FrameTask) and t.frame == root and not t.root]
+    asked, at = polygon.margin(free.stack.kinematics.com[:2]), dict(free.stack.errors())
+    with contextlib.suppress(WbplanError):
+        for _ in range(ticks):
+            free.step()
+            margin = polygon.margin(free.stack.kinematics.com[:2])
+            if margin < asked:
+                asked, at = margin, dict(free.stack.errors())
+    if asked >= phase.margin:
+        return ""
+    now = loop.stack.errors()
+    said = f"; {against}: hard tasks ask for a margin of {asked:.4f} m, {phase.margin:.4f} m is to be kept"
+    ways = [(at[key], now[key], label) for label in given if (key := f"{label}.position") in now]
+    said += "".join(
+        f"; '{label}' would have to give way by {much:.4f} m, {possible:.4f} m is possible"
+        for much, possible, label in ways
+        if much > possible + 1e-4
+    )
+    return said
 
 
 def why_at(

@@ -40,6 +40,7 @@ class Recorder:
         self._measures: list[dict[str, float]] = []
         self._worst: dict[str, float] = {}
         self._targets: list[dict[str, Array]] = []
+        self._moments: list[float] = []
         self._bodies: list[dict[str, Array]] = []
         self._microseconds: list[float] = []
         self._warnings: list[str] = []
@@ -56,6 +57,7 @@ class Recorder:
             self._errors,
             self._measures,
             self._targets,
+            self._moments,
             self._bodies,
         )
         self._edge: list[Any] = []
@@ -99,7 +101,9 @@ class Recorder:
         self._measures.append(stack.keep_measures()())
         for name, error in errors.items():
             self._worst[name] = max(error, self._worst.get(name, 0.0))
-        self._targets.append(loop.targets())
+        # What a path asks for that nothing but time changes is found at the phase's end, all at once.
+        self._targets.append(loop.targets() if stack.live else {})
+        self._moments.append(loop.t)
         self._bodies.append({**self._placed, **loop.bodies()})
 
     def end(self, index: int, loop: Loop, elapsed: float) -> None:
@@ -108,6 +112,11 @@ class Recorder:
         compiled = loop.compiled
         self._stances.append(Stance(phase, compiled.model, compiled.contact_points, compiled.held))
         first = self._phase.index(index)
+        if not loop.stack.live:
+            found = loop.targets_at(np.array(self._moments[first:]))
+            self._targets[first:] = [
+                {label: poses[k] for label, poses in found.items()} for k in range(len(self._phase) - first)
+            ]
         errors = self._errors[first:]
         tasks = []
         level = {task: k for k, tasks in enumerate(phase.levels) for task in tasks}

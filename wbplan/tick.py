@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from wbplan.backends import make_backend
 from wbplan.compiled.given import check_given
 from wbplan.compiled.phase import WORLD, CompiledPhase, compile_phase
-from wbplan.errors import SolveError, SpecError, WbplanError
+from wbplan.errors import SolveError, SpecError
 from wbplan.explain.active import Active, HeldBack
 from wbplan.explain.replay import Replay
 from wbplan.explain.why import Why, keep_goals
@@ -35,6 +35,7 @@ from wbplan.program.qp import Solution
 from wbplan.program.retract import DRIFT, Retraction
 from wbplan.program.stack import Stack
 from wbplan.robot import Robot
+from wbplan.sampling import sample
 from wbplan.state import State
 
 Array = NDArray[np.float64]
@@ -243,16 +244,22 @@ class Loop:
 
         A point that is asked for has the world's orientation; tasks in another root are left out.
         """
+        return {label: poses[0] for label, poses in self.targets_at(np.array([self.t])).items()}
+
+    def targets_at(self, times: Array) -> dict[str, Array]:
+        """`targets` (N, 7) at times (N,) [s] of the phase."""
         found = {}
         for target in self.compiled.frame_targets:
             if target.root != WORLD or target.label.startswith("contact("):
                 continue
-            value = ask(target.path, self.t)
-            if not isinstance(value, pin.SE3):
-                if np.shape(value) != (3,):
-                    continue
-                value = pin.SE3(np.eye(3), np.asarray(value))
-            found[target.label] = pin.SE3ToXYZQUAT(value)
+            first = ask(target.path, float(times[0]))
+            if not isinstance(first, pin.SE3) and np.shape(first) != (3,):
+                continue
+            points, rotations = sample(target.path, times)
+            poses = np.column_stack([points, np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1))])
+            if isinstance(first, pin.SE3):
+                poses[:, 3:] = [pin.Quaternion(rotation).coeffs() for rotation in rotations]
+            found[target.label] = poses
         return found
 
     def bodies(self) -> dict[str, Array]:
@@ -292,7 +299,7 @@ class Loop:
             stack.advance(self.t)
             solution = self._solve()
             new = self._keep(q, solution.step, before)
-        except WbplanError:
+        except BaseException:  # Ctrl-C too: in a notebook somebody may go on
             stack.aim(self.t)
             stack.measure(q)
             raise

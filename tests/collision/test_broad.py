@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 import wbplan as wb
 
 NEAR = 0.03
-#: Where the shapes may lie [m]; the two libraries' calls differ by their caches.
+GRID = np.linspace(-1.0, 1.0, 5)
+#: How far [m] two measurements of a distance may differ: one begins where it ended the last time.
 NOISE = 2e-5
 
 
@@ -29,6 +30,7 @@ def loop(request: pytest.FixtureRequest) -> wb.Loop:
         wb.Obstacle("ground", wb.Ground()),
         wb.Obstacle("wall", wb.Box((0.05, 2.0, 2.0)), (0.9, 0.0, 0.0)),
         wb.Obstacle("ball", wb.Sphere(0.1), (-0.4, 0.3, 0.4)),
+        wb.Obstacle("hills", wb.HeightField(GRID, GRID, np.zeros((5, 5))), (0.0, 0.0, -0.3)),
     )
     phase = wb.Phase(
         "any",
@@ -62,8 +64,9 @@ def missed(loop: wb.Loop, everything: Everything, q: np.ndarray) -> list[str]:
     assert clearance is not None
     loop.stack.kinematics.update(q)
     clearance.measure()
-    told, true = clearance.spare + clearance.model.bound, everything.distances()
-    near = true < clearance.model.influence - NOISE
+    true = everything.distances()
+    told = (clearance.spare + clearance.model.bound)[: len(true)]  # those with height fields come last
+    near = true < clearance.model.influence[: len(true)] - NOISE
     wrong = near & ~(np.abs(told - true) < np.where(true > 0.0, NOISE, 2e-3))
     return [
         f"{clearance.model.name(int(p))}: {true[p]:.5f}, told {told[p]:.5f}" for p in np.flatnonzero(wrong)
@@ -114,3 +117,18 @@ def test_far_pairs_are_left_alone(loop: wb.Loop) -> None:
         clearance.measure()
         compared.append(int((broad._at != before).sum()))
     assert sum(compared[1:]) / 49 < 0.1 * len(clearance.model.first)
+
+
+def test_a_pose_that_is_no_number_keeps_no_promise(loop: wb.Loop) -> None:
+    """Nothing is measured there, nothing is said to be kept, and the next good pose is measured again."""
+    clearance = loop.stack.clearance
+    assert clearance is not None
+    q = np.array(loop.q)
+    q[9] = np.nan
+    loop.stack.kinematics.update(q)
+    clearance.measure()
+    assert clearance.checked == 0
+    assert not clearance.kept()
+    assert missed(loop, Everything(loop), np.array(loop.q)) == []
+    clearance.start()
+    assert clearance.kept()

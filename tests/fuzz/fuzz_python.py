@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import copy
 import random
 from typing import Any
@@ -22,7 +23,8 @@ def mutate_python(rng: random.Random, source: str) -> bytes:
         return scarred(rng, source.encode())
     tree = ast.parse(source)
     for _ in range(rng.choice((1, 1, 1, 2, 2, 3, 5))):
-        _change(rng, tree)
+        with contextlib.suppress(IndexError):  # nothing of that kind is left
+            _change(rng, tree)
     try:
         return ast.unparse(ast.fix_missing_locations(tree)).encode("utf-8", "replace")
     except (ValueError, TypeError, AttributeError, RecursionError):
@@ -59,7 +61,7 @@ def _change(rng: random.Random, tree: ast.Module) -> None:
         _change_parameter(rng, rng.choice([n for n in nodes if isinstance(n, ast.arguments)]))
     elif kind == 8:
         pairs = [n for n in nodes if isinstance(n, ast.List | ast.Tuple) and n.elts]
-        items = rng.choice(pairs).elts if pairs else [ast.Constant(0)]
+        items = rng.choice(pairs).elts
         items.append(copy.deepcopy(rng.choice(items))) if chance(rng, 0.5) else items.pop()
     else:
         calls = [n for n in nodes if isinstance(n, ast.Call) and n.args]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -94,14 +96,26 @@ def test_a_margin_out_of_reach_says_how_much_there_is_and_which_stride_would_hol
     assert error.value.margin is not None
     assert error.value.margin < 0.54
     assert error.value.stride is not None
+    stroke = 0.2 * error.value.stride / gait_for(HEAVY, "tripod", stance, 0.0, 0.2).stride(0.2)
     held = walk(
         HEAVY,
-        gait_for(HEAVY, "tripod", stance, 0.0, 0.2),
+        gait_for(HEAVY, "tripod", stance, 0.0, stroke),
         straight(0.8),
-        0.5 * error.value.stride,
+        stroke,
+        stance=stance,
         manner=Manner(margin=0.54),
     )
     assert min(held.com.least) >= 0.54 - 1e-9
+
+
+def test_a_margin_that_no_stride_has_says_which_stance_would_hold() -> None:
+    stance = HEAVY.stance()
+    gait = gait_for(HEAVY, "tripod", stance, 0.0, 0.02)
+    with pytest.raises(wb.GaitError, match=r"no shorter stride would hold.*stance over 1\.09 times as wide"):
+        walk(HEAVY, gait, straight(0.2), 0.02, manner=Manner(margin=0.65))
+    wider = HEAVY.stance(radius=1.12 * stance.radius, height=0.5)
+    held = walk(HEAVY, gait, straight(0.2), 0.02, stance=wider, manner=Manner(margin=0.65, height=0.03))
+    assert min(held.com.least) >= 0.65 - 1e-9
 
 
 def test_a_gait_without_pauses_cannot_carry_a_quadruped_over_its_diagonal() -> None:
@@ -112,16 +126,23 @@ def test_a_gait_without_pauses_cannot_carry_a_quadruped_over_its_diagonal() -> N
     assert min(paused.com.least) >= 0.01 - 1e-9
 
 
-def test_a_leg_that_does_not_reach_is_named() -> None:
-    with pytest.raises(wb.GaitError, match=r"'leg\d' cannot reach its .*a stride of .* would hold"):
-        walk(HEAVY, gait_for(HEAVY, "tripod", HEAVY.stance(), 0.0, 0.5), straight(2.0), 0.5)
+def test_a_leg_that_does_not_reach_is_named_and_the_stride_that_is_told_holds() -> None:
+    gait = gait_for(HEAVY, "tripod", HEAVY.stance(), 0.0, 0.5)
+    with pytest.raises(wb.GaitError, match=r"'leg\d' cannot reach its .*a stride of .* would hold") as error:
+        walk(HEAVY, gait, straight(2.0), 0.5)
+    assert error.value.stride is not None
+    stroke = 0.5 * error.value.stride / gait.stride(0.5)
+    assert walk(HEAVY, gait, straight(2.0), stroke).stride == pytest.approx(error.value.stride, rel=0.1)
 
 
-def test_joints_too_slow_for_the_step_time_are_named() -> None:
+def test_joints_too_slow_for_the_step_time_are_named_and_the_time_that_is_told_holds() -> None:
     with pytest.raises(
         wb.GaitError, match=r"joint 'leg\d_knee' would have to move at .* step_time of .* would hold"
-    ):
+    ) as error:
         walked(HEAVY, "tripod", 1.0, step_time=0.3)
+    told = re.search(r"step_time of ([\d.]+) s", str(error.value))
+    assert told is not None
+    assert walked(HEAVY, "tripod", 1.0, step_time=float(told.group(1)) + 0.01)[0].fastest.share <= 1.0
 
 
 def test_a_gait_of_other_legs_is_refused() -> None:

@@ -154,6 +154,15 @@ def test_many_phases_keep_their_names_apart(machine: ModuleType, good: Bundle) -
     assert placed[-1] <= time[-1]
 
 
+@pytest.mark.parametrize("size", [1e200, 1.7e308])
+def test_absurd_numbers_are_drawn_without_a_word(
+    machine: ModuleType, good: Bundle, tmp_path: Path, size: float
+) -> None:
+    """Matplotlib's scales overflow, and it says so in warnings that are no use to anybody."""
+    errors = {"hand.position": np.linspace(0.0, size, len(good.trajectory))}
+    assert plots.save(machine.edited(good, errors=errors), tmp_path / "far.png").stat().st_size > 10_000
+
+
 def test_a_path_that_cannot_be_written_is_named(good: Bundle, tmp_path: Path) -> None:
     with pytest.raises(BundleError, match=r"nowhere.*plots\.png: cannot be written"):
         plots.save(good, tmp_path / "nowhere" / "plots.png")

@@ -45,9 +45,11 @@ class Distances:
         self.model, self.data = model, model.createData()
         self.found = self.geometry.createData()
 
-    def at(self, q: Any) -> Any:
-        """(pairs,) [m]; negative where two go into each other."""
-        pin.computeDistances(self.model, self.data, self.geometry, self.found, q)
+    def at(self, q: Any, enough: float) -> Any:
+        """(pairs,) [m]; negative where two go into each other, infinite where all have `enough`."""
+        nearest = pin.computeDistances(self.model, self.data, self.geometry, self.found, q)
+        if not self.geometry.collisionPairs or self.found.distanceResults[nearest].min_distance >= enough:
+            return np.full(len(self.geometry.collisionPairs), np.inf)
         return np.array([result.min_distance for result in self.found.distanceResults])
 
 

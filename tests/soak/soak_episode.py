@@ -16,8 +16,8 @@ from soak_watch import Watch
 
 import wbplan as wb
 
-LONGEST = 400  #: ticks of one phase
-ENDLESS = 5.0  #: [s] of the processor's time, that a tick may take; the first ones compile
+LONGEST = 800  #: ticks of one phase
+ENDLESS = 30.0  #: [s] of the processor's time, that a tick may take; the first ones compile
 REFUSALS = 3  #: in a row, then the phase is given up
 
 
@@ -119,7 +119,7 @@ def _run_phase(
         out.counts[f"ticks {backend}"] += 1
         if tick.warning:
             out.counts[f"warned: {re.split('[:(]', tick.warning)[0]}"] += 1
-        if rng.random() < 0.02:
+        if rng.random() < 0.01:
             str(tick.active)
             if not np.isfinite(list(tick.errors.values())).all():
                 out.found.append(f"an error that is not finite: {dict(tick.errors)} ({backend})")

@@ -50,7 +50,7 @@ class Watch:
         self.distances, self.bound = None, 0.0
         if phase.self_collision is not None:
             self.distances, self.bound = Distances(robot, self.model), phase.self_collision.distance
-            self.apart = self.distances.at(self.q)
+            self.apart = self.distances.at(self.q, self.bound)
         self._place(self.q)
         self.anchors = {c.frame: self._pose(c.frame).translation.copy() for c in phase.contacts}
         self.loops = {pair: self._between(*pair) for pair in phase.closures}
@@ -145,7 +145,7 @@ class Watch:
             shares["jerk"] = float((over / self.twist).max()) / (1.0 + 1e-6)
             self.step, self.changed = step, changed
         if self.distances is not None:
-            apart = self.distances.at(q)
+            apart = self.distances.at(q, self.bound)
             short = np.minimum(self.apart, self.bound) - apart
             shares["clearance"] = max(float(short.max(initial=0.0)), 0.0) / NEARER
             self.apart = apart

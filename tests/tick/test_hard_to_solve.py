@@ -116,6 +116,33 @@ def test_jerk_is_kept_where_one_phase_follows_another(legarm: wb.Robot) -> None:
     assert changes["whole"] <= jerk * (1 + 1e-6) < changes["half"]
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("during", ["advance", "keep"])
+def test_a_tick_that_is_interrupted_never_was(
+    legarm: wb.Robot, backend: str, during: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = legarm.state("stand")
+    goal = wb.MinJerk(start.com, start.com + np.array([0.01, 0.0, 0.0]), 0.1)
+    phase = standing(legarm, [wb.ComTask(goal), wb.PostureTask()], [wb.JointLimits()])
+    loop, other = (wb.Loop(legarm, phase, start, dt=0.01, backend=backend) for _ in range(2))
+    for each in (loop, other):
+        each.step()
+    method = {"advance": "advance", "keep": "measure"}[during]
+    real, calls = getattr(loop.stack, method), []
+
+    def interrupted(*args: Any) -> None:
+        real(*args)
+        calls.append(method)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop.stack, method, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        loop.step()
+    assert loop.t == other.t
+    np.testing.assert_allclose(loop.step().q, other.step().q, atol=1e-9)
+
+
 def test_numbers_whose_squares_are_none_are_refused(legarm: wb.Robot) -> None:
     with pytest.raises(wb.SpecError, match="1e\\+30"):
         wb.PositionTask("body", np.array([1e200, 0.0, 0.0]))

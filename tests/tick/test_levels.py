@@ -103,7 +103,7 @@ def test_a_tick_is_that_of_a_plain_cascade(
     assert first > 0
     solution = loop._backend.solve()
     off = misses(loop.stack, expected, solution.step[loop.stack.free])
-    assert off[0] < 1e-8
+    assert off[0] < 1e-7  # of 0.01 or so; the reference is as exact
     # The second level too, where none of the first is held back; else it may be kept from bending the first.
     left = loop.stack.levels[0].rhs - loop.stack.levels[0].rows @ expected[0]
     if (np.abs(left) < 1e-6 * loop.stack.levels[0].pulls).all():

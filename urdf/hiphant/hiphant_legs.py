@@ -166,7 +166,9 @@ def thigh(leg: str) -> Link:
     low, high = sorted((side * INNER, side * OUTER))
     body_low, body_high = sorted((side * (INNER - T.module_length), side * INNER))
     covers = (
-        block((-0.054, low, knee - 0.048), (0.054, high, 0.054)),
+        rod((0.0, low, 0.0), (0.0, high, 0.0), 0.054),
+        block((-0.036, low, knee), (0.036, high, 0.0)),
+        rod((0.0, low, knee), (0.0, high, knee), 0.048),
         block((-0.05, body_low, knee - 0.05), (0.05, body_high, knee + 0.05)),
     )
     return Link(f"{leg}_thigh", tuple(parts), T.thigh_shell, covers)

@@ -24,10 +24,10 @@ from wbplan.bundle import Bundle, is_bundle
 from wbplan.checks import check as recompute
 from wbplan.cli.live import LiveView
 from wbplan.cli.printing import print_plan, print_robot, print_simulation
-from wbplan.cli.survey import distinct, survey, table
+from wbplan.cli.survey import setting, survey, table
 from wbplan.errors import BundleError, CheckFailed, GaitError, PlanFalls, SolveError, SpecError, WbplanError
-from wbplan.gaits import Walker, comfortable, cycle_figure, gait_for, gaits_of, mode_named
-from wbplan.papers import DIFFERS, report, summary
+from wbplan.gaits import cycle_figure, gaits_for, mode_named
+from wbplan.papers import DIFFERS, figure_16, report, summary
 from wbplan.physics import ghost_of
 from wbplan.physics import simulate as replay
 from wbplan.planner import plan
@@ -269,16 +269,9 @@ def gaits(
     """Walk every gait of a robot: speed, distance, margin, slip and clearance, planned and measured."""
     loaded, way = load_robot(robot_name), mode_named(mode)
     if figure is not None:
-        walker = Walker(loaded)
-        stance = walker.stance(lean=way.lean)
-        stance, stroke = comfortable(walker, stance, 0.1 * stance.height)
-        chosen = [
-            gait_for(walker, name, stance, way.heading, stroke)
-            for name in names or distinct(gaits_of(walker.ring))
-        ]
-        cycle_figure(chosen, stance.feet, way.heading, stroke, f"{loaded.name}, {way.name}").savefig(
-            figure, dpi=110
-        )
+        chosen = [setting(loaded, name, way) for name in names or gaits_for(loaded, way)]
+        shown = [(one.gait, one.stance.feet, one.stroke) for one in chosen]
+        cycle_figure(shown, way.heading, f"{loaded.name}, {way.name}").savefig(figure, dpi=110)
     rows = list(survey(loaded, names, mode=way, cycles=cycles))
     _console().print(table(rows, f"{loaded.name}, {way.name}: {cycles:g} cycles of every gait"))
     broken = [row.gait for row in rows if not row.held]
@@ -291,8 +284,14 @@ def papers(
     paper: Annotated[
         str | None, typer.Argument(help="mana, zheng, hexpiderix, hiphant or zhuang; all where not given.")
     ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="A PNG file for the margins of a change of gait beside Zheng's figure 16."),
+    ] = None,
 ) -> None:
     """What the papers print about kinematics beside what comes out here; exit code 1 where that differs."""
+    if figure is not None:
+        figure_16().savefig(figure, dpi=110)
     rows = report(paper)
     _console().print(summary([row.cells() for row in rows]))
     counts = {

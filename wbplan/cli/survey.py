@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, final
@@ -13,17 +13,20 @@ from numpy.typing import NDArray
 
 from wbplan.errors import SpecError
 from wbplan.gaits import (
+    CLOSING,
     Gait,
     Manner,
     Mode,
+    Stance,
     Walk,
     Walker,
     comfortable,
     gait_for,
-    gaits_of,
+    gaits_for,
     step_margins,
     straight,
     walk,
+    walker_for,
 )
 from wbplan.planner import Plan, plan
 from wbplan.robot import Robot
@@ -40,7 +43,7 @@ class Walked:
     """One gait, walked and measured on the trajectory.
 
     Attributes:
-        gait: its name.
+        robot, mode, gait: their names.
         duty: duty factor.
         steps: in a cycle.
         speed: of the gait, v = s n / (T u) with the longest stance's stroke [m/s].
@@ -58,6 +61,8 @@ class Walked:
         held: whether all promises hold.
     """
 
+    robot: str
+    mode: str
     gait: str
     duty: float
     steps: int
@@ -75,6 +80,47 @@ class Walked:
     held: bool
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """How a robot would walk in a gait, its stance and stroke those that are easy.
+
+    Attributes:
+        walker: its legs; of six, five for a gait of five.
+        gait: the gait.
+        stance: of the feet.
+        stroke: of a standing foot [m].
+        lift: of a swinging one [m].
+        mode: which way legs point and it goes.
+    """
+
+    walker: Walker
+    gait: Gait
+    stance: Stance
+    stroke: float
+    lift: float
+    mode: Mode
+
+
+def setting(robot: Robot, name: str, mode: Mode | None = None) -> Setting:
+    """How a robot would walk in a gait.
+
+    Args:
+        robot: the robot.
+        name: of the gait.
+        mode: which way its legs point and it goes.
+
+    Raises:
+        SpecError: the robot has no such gait, or not in that mode.
+    """
+    mode, walker = mode or Mode("free", None, 0.0), walker_for(robot, name)
+    stance = walker.stance(lean=mode.lean, even=CLOSING if walker.raised else 0.0)
+    lift = 0.1 * stance.height
+    stance, stroke = comfortable(walker, stance, lift, heading=mode.heading)
+    gait = gait_for(walker, name, stance, mode.heading, stroke)
+    return Setting(walker, gait, stance, stroke, lift, mode)
+
+
 def survey(
     robot: Robot,
     names: Iterable[str] | None = None,
@@ -87,7 +133,7 @@ def survey(
 
     Args:
         robot: the robot.
-        names: of the gaits; all that so many legs have where not given.
+        names: of the gaits; all that it has where not given.
         mode: which way its legs point and it goes.
         cycles: how far, in strides.
         dt: length of a tick [s].
@@ -95,40 +141,38 @@ def survey(
     Raises:
         GaitError: a gait cannot be walked.
     """
-    walker = Walker(robot)
-    mode = mode or Mode("free", None, 0.0)
-    stance = walker.stance(lean=mode.lean)
-    lift = 0.1 * stance.height
-    stance, stroke = comfortable(walker, stance, lift)
-    for name in names or distinct(gaits_of(walker.ring)):
-        gait = gait_for(walker, name, stance, mode.heading, stroke)
-        began = perf_counter()
-        track = straight(cycles * gait.stride(stroke), mode.heading)
-        walked = walk(walker, gait, track, stroke, stance=stance, manner=Manner(height=lift))
-        planned = plan(robot, walked.script, dt=dt, task=f"survey {name}")
-        seconds = perf_counter() - began
-        margins = [step.centre for step in step_margins(gait, stance.feet)]
-        yield measured(walked, planned, gait, stroke, track.length, min(margins), seconds)
+    for name in names or gaits_for(robot, mode):
+        yield walk_once(setting(robot, name, mode), cycles, dt)
 
 
-def distinct(gaits: Mapping[str, Gait]) -> list[str]:
-    """Names of gaits, each only under the first of its names."""
-    first: dict[object, str] = {}
-    for name, gait in gaits.items():
-        first.setdefault((gait.steps, gait.lasting, gait.advance), name)
-    return list(first.values())
+def walk_once(given: Setting, cycles: float = 2.0, dt: float = 0.01) -> Walked:
+    """A few cycles of one gait on level ground, planned and measured.
+
+    Args:
+        given: robot, gait, stance and stroke.
+        cycles: how far, in strides.
+        dt: length of a tick [s].
+    """
+    began = perf_counter()
+    gait, stance, stroke = given.gait, given.stance, given.stroke
+    track = straight(cycles * gait.stride(stroke), given.mode.heading)
+    walked = walk(given.walker, gait, track, stroke, stance=stance, manner=Manner(height=given.lift))
+    planned = plan(given.walker.robot, walked.script, dt=dt, task=f"survey {gait.name}")
+    seconds = perf_counter() - began
+    return measured(given, walked, planned, track.length, seconds)
 
 
-def measured(
-    walked: Walk, planned: Plan, gait: Gait, stroke: float, distance: float, centre: float, seconds: float
-) -> Walked:
+def measured(given: Setting, walked: Walk, planned: Plan, distance: float, seconds: float) -> Walked:
     """The figures of a walk, from its trajectory."""
+    gait, stroke = given.gait, given.stroke
     course, first = walked.schedule.course, walked.steps[1].begin
     whole = distance >= 2.0 * gait.stride(stroke) - 1e-9  # then it goes a cycle and more at full speed
     beat = next(s.duration for s in walked.steps if s.swing)
     trajectory, report = planned.trajectory, planned.check()
     moved = trajectory.q[-1, :2] - trajectory.q[0, :2]
     return Walked(
+        planned.robot.name,
+        given.mode.name,
         gait.name,
         gait.duty_factor,
         gait.step_count,
@@ -141,7 +185,7 @@ def measured(
         ),
         distance,
         float(np.linalg.norm(moved)),
-        centre,
+        min(step.centre for step in step_margins(gait, given.stance.feet)),
         walked.margin,
         float(np.nanmin(trajectory.margin)),
         next((row.worst for row in report.rows if row.promise == "foot slip"), 0.0),
@@ -184,9 +228,10 @@ def clearance(walked: Walk, planned: Plan, ground: float = 0.0) -> float:
 def table(rows: Iterable[Walked], title: str) -> Table:
     """The figures of gaits as a table to print.
 
-    Columns: duty factor; steps in a cycle; the gait's speed and the one found; way asked and gone; margin
-    of the body's middle at worst, margin promised and the least there is; slip of standing feet; clearance of
-    swinging ones; time of the motion over the time of planning it; whether all promises hold.
+    Columns: robot and mode, where there are several; duty factor; steps in a cycle; the gait's speed and the
+    one found; way asked and gone; margin of the body's middle at worst, margin promised and the least there
+    is; slip of standing feet; clearance of swinging ones; time of the motion over the time of planning it;
+    whether all promises hold.
 
     Args:
         rows: one for each gait.
@@ -194,15 +239,18 @@ def table(rows: Iterable[Walked], title: str) -> Table:
     """
     from rich.table import Table
 
+    rows = list(rows)
     shown = Table(title=f"{title}; mm, mm/s, slip in um", title_justify="left")
+    where = ("robot", "mode") if len({(row.robot, row.mode) for row in rows}) > 1 else ()
     for name in (
-        "gait", "duty", "steps", "speed", "found", "way", "gone", "centre", "asked", "margin", "slip",
+        *where, "gait", "duty", "steps", "speed", "found", "way", "gone", "centre", "asked", "margin", "slip",
         "clear", "rate", "promises",
     ):  # fmt: skip
-        shown.add_column(name, justify="left" if name in ("gait", "promises") else "right")
+        shown.add_column(name, justify="left" if name in ("robot", "mode", "gait", "promises") else "right")
     for row in rows:
         millimetres = (row.speed, row.measured, row.distance, row.gone, row.centre, row.promised, row.margin)
         shown.add_row(
+            *(str(getattr(row, name)) for name in where),
             row.gait,
             f"{row.duty:.3f}",
             str(row.steps),

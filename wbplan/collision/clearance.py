@@ -98,6 +98,8 @@ class Clearance:
         self._on_fields = [
             (p, int(model.first[p]), int(model.second[p]) - shapes) for p in range(solid, len(model.first))
         ]
+        table = np.array(self._on_fields, dtype=np.int64).reshape(-1, 3)
+        self._by_field = [table[table[:, 2] == k, :2].T for k in range(len(self._fields))]
         joints = np.array([thing.joint for thing in model.things], dtype=np.int64)
         self._joint_a, self._joint_b = joints[model.first], joints[model.second]
         pinocchio = self._kinematics.model
@@ -145,10 +147,10 @@ class Clearance:
             self._points, self.spare, model.promised,
         )  # fmt: skip
         self._broad.far(self._distance)
-        if self._on_fields:
+        if self._on_fields and self._broad.known:
             kernels.centres(self._rotations, self._places, self._broad.offset, self._middles)
-        for p, shape, field in self._on_fields:
-            self._measure_field(p, shape, self._fields[field], field)
+            for number, field in enumerate(self._fields):
+                self._measure_field(number, field)
         self.checked = self._count
         count = self._count
         if self._places_all is not self._places:
@@ -206,17 +208,23 @@ class Clearance:
         told = np.concatenate([result.normal, result.getNearestPoint1(), result.getNearestPoint2()])
         return view if np.array_equal(view[0], told, equal_nan=True) else None
 
-    def _measure_field(self, pair: int, shape: int, field: Field, number: int) -> None:
-        item, reach = self.model.geometry.geometryObjects[shape], float(self.model.influence[pair])
-        low, high = field.local_box(self._middles[shape], self._rotations[shape], self._broad.half[shape])
-        pose = None
-        for cell, prism in field.near(low, high, reach):
-            pose = pose or coal.Transform3s(self._rotations[shape], self._places[shape])
-            self._result.clear()
-            coal.distance(item.geometry, pose, prism, field.pose, self._request, self._result)
-            if self._result.min_distance < reach:
-                key = len(self.spare) + (cell * len(self._fields) + number) * len(self.spare) + pair
-                self._note(key, pair, self._result)
+    def _measure_field(self, number: int, field: Field) -> None:
+        """Distances of all shapes to the triangles of a height field that may be near them."""
+        pairs, shapes = self._by_field[number]
+        reaches = self.model.influence[pairs]
+        lows, highs = field.local_boxes(
+            self._middles[shapes], self._rotations[shapes], self._broad.half[shapes]
+        )
+        for k in np.flatnonzero(lows[:, 2] - reaches <= field.highest).tolist():
+            pair, shape, reach = int(pairs[k]), int(shapes[k]), float(reaches[k])
+            item, pose = self.model.geometry.geometryObjects[shape], None
+            for cell, prism in field.near(lows[k].tolist(), highs[k].tolist(), reach):
+                pose = pose or coal.Transform3s(self._rotations[shape], self._places[shape])
+                self._result.clear()
+                coal.distance(item.geometry, pose, prism, field.pose, self._request, self._result)
+                if self._result.min_distance < reach:
+                    key = len(self.spare) + (cell * len(self._fields) + number) * len(self.spare) + pair
+                    self._note(key, pair, self._result)
 
     def start(self) -> None:
         """A tick begins where `measure` was called last: what is too near there may stay so, no nearer."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, final
 
 import coal
@@ -26,6 +27,7 @@ class Field:
 
     Attributes:
         pose: coal's pose of all of it.
+        highest: its highest point, in its own frame [m].
     """
 
     def __init__(self, item: Obstacle) -> None:
@@ -35,32 +37,32 @@ class Field:
         self._R, self._p = np.array(item.pose.rotation), np.array(item.pose.translation)
         self.pose = coal.Transform3s(self._R, self._p)
         x, y, z = item.shape.x, item.shape.y, item.shape.heights
-        self._origin, self._step = np.array([x[0], y[0]]), np.array([x[1] - x[0], y[1] - y[0]])
-        self._cells = np.array([len(x) - 1, len(y) - 1])
+        steps = (float(x[1] - x[0]), float(y[1] - y[0]))
+        self._grid = (float(x[0]), float(y[0])), steps, (len(x) - 1, len(y) - 1)
         self._bottom = float(z.min()) - DEEP
         self._top = np.maximum(np.maximum(z[:-1, :-1], z[1:, :-1]), np.maximum(z[:-1, 1:], z[1:, 1:]))
+        self.highest = float(z.max())
         self._prisms: dict[int, Any] = {}
 
-    def near(self, low: Array, high: Array, reach: float) -> list[tuple[int, Any]]:
+    def near(self, low: list[float], high: list[float], reach: float) -> list[tuple[int, Any]]:
         """Number and prism of every triangle within `reach` [m] of a box of the field's own frame."""
-        first = np.floor((low[:2] - reach - self._origin) / self._step).astype(int).clip(0, self._cells)
-        last = np.ceil((high[:2] + reach - self._origin) / self._step).astype(int).clip(0, self._cells)
+        (x, y), (dx, dy), (nx, ny) = self._grid
+        i0, j0 = max(math.floor((low[0] - reach - x) / dx), 0), max(math.floor((low[1] - reach - y) / dy), 0)
+        i1, j1 = math.ceil((high[0] + reach - x) / dx), math.ceil((high[1] + reach - y) / dy)
         found = []
-        for i in range(first[0], last[0]):
-            for j in range(first[1], last[1]):
-                if self._top[i, j] >= low[2] - reach:
-                    for half in (0, 1):
-                        number = 2 * (i * int(self._cells[1]) + j) + half
-                        if number not in self._prisms:
-                            self._prisms[number] = self._prism(i, j, half)
-                        found.append((number, self._prisms[number]))
+        for i, j in np.argwhere(self._top[i0 : min(i1, nx), j0 : min(j1, ny)] >= low[2] - reach).tolist():
+            cell = 2 * ((i0 + i) * ny + j0 + j)
+            for number in (cell, cell + 1):
+                if number not in self._prisms:
+                    self._prisms[number] = self._prism(i0 + i, j0 + j, number - cell)
+                found.append((number, self._prisms[number]))
         return found
 
-    def local_box(self, centre: Array, rotation: Array, half: Array) -> tuple[Array, Array]:
-        """Lowest and highest corner, in the field's frame, of a box in the world."""
-        middle = (centre - self._p) @ self._R
-        extent = np.abs(self._R.T @ rotation) @ half
-        return middle - extent, middle + extent
+    def local_boxes(self, centres: Array, rotations: Array, halves: Array) -> tuple[Array, Array]:
+        """Lowest and highest corners (S, 3), in the field's frame, of boxes in the world."""
+        middles = (centres - self._p) @ self._R
+        extents = np.einsum("sij,sj->si", np.abs(self._R.T @ rotations), halves)
+        return middles - extents, middles + extents
 
     def _prism(self, i: int, j: int, half: int) -> Any:
         x, y, z = self._shape.x, self._shape.y, self._shape.heights

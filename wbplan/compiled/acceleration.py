@@ -75,13 +75,14 @@ def standing_inertia(model: Any, q: Array, feet: Sequence[str]) -> Array:
     """
     inertia, slides = np.zeros(model.nv - 6), _slides(model)
     data = model.createData()
+    pin.computeJointJacobians(model, data, q)
     mass = sum(body.mass for body in model.inertias) / max(len(feet), 1)
     for foot in feet:
         frame = find_frame(model, foot)
-        moved = pin.computeFrameJacobian(model, data, q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        for j, _ in _chain(model, model.frames[frame].parentJoint, 0.0):
-            r = np.linalg.norm(moved[:3, 6 + j])  # what a unit of the joint's speed moves the foot by
-            inertia[j] += mass if slides[j] else mass * r**2
+        moved = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        squared = (moved[:3, 6:] ** 2).sum(axis=0)  # what a unit of a joint's speed moves the foot by
+        for j in _joints_of(model, frame):
+            inertia[j] += mass if slides[j] else mass * squared[j]
     return inertia
 
 
@@ -148,6 +149,12 @@ def braking_bounds(robot: Robot, phase: Phase, bounds: Array) -> Array:
     return braking
 
 
+def braking_kind(phase: Phase) -> tuple[object, ...]:
+    """What a phase's bounds depend on beside the robot and how it stands: phases alike in it share them."""
+    led = {(t.frame, t.root) for t in phase.hard if isinstance(t, FrameTask) and not t.path.constant}
+    return tuple(contact.frame for contact in phase.contacts), phase.joint_limits, frozenset(led)
+
+
 def stopping_bounds(robot: Robot, phase: Phase, bounds: Array) -> tuple[Array, NDArray[np.bool_]]:
     """`braking_bounds` and `led_joints`."""
     return braking_bounds(robot, phase, bounds), led_joints(robot, phase)
@@ -165,11 +172,13 @@ def led_joints(robot: Robot, phase: Phase) -> NDArray[np.bool_]:
 def _joints_to(model: Any, frames: Iterable[str]) -> set[int]:
     """Actuated joints between the base and any of these frames; bodies that are carried are left out."""
     return {
-        j
-        for name in frames
-        if model.existFrame(name)
-        for j, _ in _chain(model, model.frames[find_frame(model, name)].parentJoint, 0.0)
+        j for name in frames if model.existFrame(name) for j in _joints_of(model, find_frame(model, name))
     }
+
+
+def _joints_of(model: Any, frame: int) -> list[int]:
+    """Actuated joints between the base and a frame."""
+    return [j - 2 for j in model.supports[model.frames[frame].parentJoint] if j > 1]
 
 
 def jerk_bounds(robot: Robot, phase: Phase) -> Array | None:

@@ -13,10 +13,11 @@ from wbplan.gaits.stance import ANT, CRAB, MIXED_I, MIXED_II, MODES, Mode, Stanc
 from wbplan.gaits.swing import CosineSwing, Excerpt, QuinticSwing
 from wbplan.gaits.switch import Switch, Unfolding, perform
 from wbplan.gaits.tracks import Track, arc, on_the_spot, straight, through
-from wbplan.gaits.walking import gait_for, walk
+from wbplan.gaits.walking import CLOSING, gait_for, gaits_for, walk, walker_for
 
 __all__ = [
     "ANT",
+    "CLOSING",
     "CRAB",
     "MIXED_I",
     "MIXED_II",
@@ -53,6 +54,7 @@ __all__ = [
     "flat",
     "gait_for",
     "gait_named",
+    "gaits_for",
     "gaits_of",
     "mode_named",
     "nominal",
@@ -75,5 +77,6 @@ __all__ = [
     "through",
     "tripod",
     "walk",
+    "walker_for",
     "wave",
 ]

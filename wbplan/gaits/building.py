@@ -47,7 +47,8 @@ class Manner:
             allow where not given.
         height: how high feet are lifted over the higher end of their way [m].
         clearance: least height of a foot over the ground in the middle half of its way [m].
-        margin: stability margin kept all through [m]; half of the largest where not given.
+        margin: stability margin kept all through [m]; half of the largest where not given (a quarter where
+            legs do not reach far enough for the body's sway then).
         friction: of the feet on the ground [-].
         speed: share of the joints' speed limits that may be used.
         follow: how much of the mean height of its footholds the body goes up and down with, 0 to 1.
@@ -173,6 +174,7 @@ def build(
     ground: Ground = flat,
     fields: Fields | None = None,
     known: Walk | None = None,
+    usual: float = USUAL,
 ) -> Walk:
     """Phases of a schedule.
 
@@ -185,6 +187,7 @@ def build(
         fields: a step -> more fields of its phase; 'hard' are added to its own, 'soft' stand for those that
             keep the joints of other limbs.
         known: the same walk at another speed: only its times change.
+        usual: share of the largest margin that is kept where the manner gives none.
 
     Raises:
         GaitError: see `walk`.
@@ -197,7 +200,7 @@ def build(
     motion = _Motion(
         made, manner.rest, (start.com - start.q[:3])[:2], _heights(steps, stance.height, manner.follow)
     )
-    com, margin = _balanced(steps, motion, manner) if known is None else _retimed(known, motion)
+    com, margin = _balanced(steps, motion, manner, usual) if known is None else _retimed(known, motion)
     swings = [
         {limb: _swing(limb, ends, step, manner, ground) for limb, ends in step.swing.items()}
         for step in steps
@@ -310,7 +313,7 @@ def _retimed(known: Walk, motion: _Motion) -> tuple[Sway, float]:
     return Sway(motion.com, spline, known.com.least), known.margin
 
 
-def _balanced(steps: Sequence[Step], motion: _Motion, manner: Manner) -> tuple[Sway, float]:
+def _balanced(steps: Sequence[Step], motion: _Motion, manner: Manner, usual: float) -> tuple[Sway, float]:
     """The centre of mass's motion and the margin that it keeps."""
     stays = []
     for step in steps:
@@ -321,7 +324,7 @@ def _balanced(steps: Sequence[Step], motion: _Motion, manner: Manner) -> tuple[S
         stays.append(Stay(step.begin, step.end, polygon))
     ends = motion.com(np.array([steps[0].begin, steps[-1].end]))
     largest = largest_margin(stays, ends[0], ends[1])
-    margin = USUAL * largest if manner.margin is None else manner.margin
+    margin = usual * largest if manner.margin is None else manner.margin
     held = largest > 0.0 and margin <= largest
     found = sway(stays, motion.com, margin, manner.beat / 2.0) if held else None
     if found is None:

@@ -21,15 +21,13 @@ COLUMNS = 3
 
 
 def cycle_figure(
-    gaits: Sequence[Gait], stance: Mapping[str, ArrayLike], heading: float, stroke: float, title: str = ""
+    gaits: Sequence[tuple[Gait, Mapping[str, ArrayLike], float]], heading: float, title: str = ""
 ) -> Figure:
     """Margin of the body's middle over one cycle of steady walking, and the legs' stances, for each gait.
 
     Args:
-        gaits: of the same legs.
-        stance: leg -> foot (2,) [m].
+        gaits: gait, its stance (leg -> foot (2,) [m]), and the stroke of its longest stance [m].
         heading: of travel [rad].
-        stroke: of the longest stance [m].
         title: of the figure.
     """
     columns = min(COLUMNS, len(gaits))
@@ -37,7 +35,7 @@ def cycle_figure(
     figure = blank(5.0 * columns, 3.0 * rows + 0.4)
     grid = figure.add_gridspec(2 * rows, columns, height_ratios=[2.0, 1.0] * rows)
     ahead = np.array([np.cos(heading), np.sin(heading)])
-    for k, gait in enumerate(gaits):
+    for k, (gait, stance, stroke) in enumerate(gaits):
         row, column = divmod(k, columns)
         above = figure.add_subplot(grid[2 * row, column])
         _margins(above, gait, stance, gait.stride(stroke) * ahead)

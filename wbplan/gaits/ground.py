@@ -30,20 +30,22 @@ NEAR = 1e-3
 @final
 @dataclass(frozen=True, eq=False)
 class Over:
-    """Height of a terrain, and of the floor where it has nothing.
+    """Where feet stand on a terrain, and on the floor where it has nothing.
 
     Args:
         terrain: obstacles seen from above.
-        floor: [m].
+        floor: its height [m].
+        sole: how far feet's frames are over the ground [m].
     """
 
     terrain: Terrain
     floor: float = 0.0
+    sole: float = 0.0
 
     def __call__(self, x: float, y: float) -> float:
         """Height [m] at x, y [m]."""
         found = float(self.terrain.height(x, y))
-        return found if np.isfinite(found) else self.floor
+        return self.sole + (found if np.isfinite(found) else self.floor)
 
     def normal(self, x: float, y: float) -> tuple[float, float, float]:
         """Unit normal of the surface at x, y [m]."""
@@ -51,14 +53,15 @@ class Over:
         return a, b, c
 
 
-def over(terrain: Terrain, floor: float = 0.0) -> Over:
+def over(terrain: Terrain, floor: float = 0.0, sole: float = 0.0) -> Over:
     """The ground that a terrain is, with its slopes.
 
     Args:
         terrain: obstacles seen from above.
         floor: its height where it has nothing [m].
+        sole: how far feet's frames are over the ground [m].
     """
-    return Over(terrain, floor)
+    return Over(terrain, floor, sole)
 
 
 def normal_at(ground: Ground, foot: Array) -> tuple[float, float, float]:

@@ -122,6 +122,14 @@ def gaits_of(legs: Legs) -> Mapping[str, Gait]:
     return MappingProxyType({gait.name: gait for gait in made})
 
 
+def distinct(gaits: Mapping[str, Gait]) -> tuple[str, ...]:
+    """Names of gaits, each only under the first of its names."""
+    first: dict[object, str] = {}
+    for name, gait in gaits.items():
+        first.setdefault((gait.steps, gait.lasting, gait.advance), name)
+    return tuple(first.values())
+
+
 def gait_named(name: str, legs: Legs) -> Gait:
     """A built-in gait by its name.
 

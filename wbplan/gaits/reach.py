@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 #: Moments looked at in a step.
 MOMENTS = 7
+#: Heights of the body that are tried, of the stance's own.
+HEIGHTS = np.arange(0.8, 1.31, 0.05)
 
 
 @final
@@ -141,39 +143,73 @@ def _stroke(leg: Any, foot: Array, ahead: Array, lift: float, most: float, wante
     return low
 
 
-def roomiest(walker: Walker, stance: Stance, lift: float) -> Stance:
+def roomiest(walker: Walker, stance: Stance, lift: float, heading: float | None = None) -> Stance:
     """The stance at the body height, from 0.8 to 1.3 of its own, that leaves most room for strokes.
 
     Args:
         walker: the legs.
         stance: of the feet.
         lift: height of the swing [m].
+        heading: of the stroke in the body [rad]; of any where not given.
     """
     best, most = stance, 0.0
-    for height in stance.height * np.arange(0.8, 1.31, 0.05):
+    for height in stance.height * HEIGHTS:
         tried = Stance(stance.feet, float(height))
-        stroke = room(walker, tried, lift, wanted=most)
+        stroke = room(walker, tried, lift, heading, most)
         if stroke > most:
             best, most = tried, stroke
     return best
 
 
-def comfortable(walker: Walker, stance: Stance, lift: float, *, adjust: bool = True) -> tuple[Stance, float]:
+def comfortable(
+    walker: Walker, stance: Stance, lift: float, *, adjust: bool = True, heading: float | None = None
+) -> tuple[Stance, float]:
     """A stance and a stroke [m] that legs make with ease.
 
-    The stroke is six tenths of the room that there is, and half the body's height at most.
+    The stroke is six tenths of the room that there is in any direction (in the one given, where there is none
+    in others), and half the body's height at most.
 
     Args:
         walker: the legs.
         stance: of the feet.
         lift: height of the swing [m].
         adjust: the body may be higher or lower where legs have next to no room at the stance.
+        heading: of travel in the body [rad].
+
+    Raises:
+        GaitError: legs have no room for any stroke; says why the first of them has none.
     """
-    stroke = room(walker, stance, lift)
-    if adjust and stroke < 0.1 * stance.height:
-        stance = roomiest(walker, stance, lift)
-        stroke = room(walker, stance, lift)
-    return stance, min(0.6 * stroke, 0.5 * stance.height)
+
+    def best(towards: float | None) -> tuple[Stance, float]:
+        stroke, found = room(walker, stance, lift, towards), stance
+        if adjust and stroke < 0.1 * stance.height:
+            found = roomiest(walker, stance, lift, towards)
+            stroke = room(walker, found, lift, towards)
+        return found, min(0.6 * stroke, 0.5 * stance.height)
+
+    found, stroke = best(None)
+    if stroke <= 0.0 and heading is not None:
+        found, stroke = best(heading)
+    if stroke <= 0.0:
+        raise GaitError(
+            f"stance: no leg may make the least stroke: {_hindered(walker, stance, lift, heading)}"
+        )
+    return found, stroke
+
+
+def _hindered(walker: Walker, stance: Stance, lift: float, heading: float | None) -> str:
+    """Why the first leg without room has none, at the height at which fewest legs have none."""
+    ahead = 1e-3 * np.array([np.cos(heading or 0.0), np.sin(heading or 0.0), 0.0])
+    up = np.array([0.0, 0.0, lift])
+    reasons = []
+    for height in stance.height * HEIGHTS:
+        here = []
+        for leg, form in walker.closed.items():
+            foot = np.array([*stance.feet[leg], -height])
+            found = [form.solve(place) for place in (foot, foot + up, foot - ahead, foot + ahead)]
+            here += [f"'{leg}', {each.reason}" for each in found if not each.within][:1]
+        reasons.append(here or ["there is less than a few millimetres of room"])
+    return min(reasons, key=len)[0]
 
 
 def shares(walker: Walker, stance: Stance, heading: float) -> dict[str, Array]:

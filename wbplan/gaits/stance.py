@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, final
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wbplan.collision import has_shapes, sole
 from wbplan.errors import SpecError, listing
 from wbplan.mechanism import Platform, ThreeJointLeg
-from wbplan.paths import number
+from wbplan.paths import name_of, number
 from wbplan.robot import Robot
 from wbplan.state import State
 
@@ -95,22 +95,36 @@ class Stance:
         return Stance(kept, self.height)
 
 
+#: How high raised limbs are held, as a share of the body's height.
+LIFTED = 0.3
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Walker:
     """A robot's legs as walking sees them.
 
-    Attributes:
+    Args:
         robot: the robot.
         pose: named pose that it walks from.
+        raised: limbs that stand in the pose, but are held in the air instead: arms, or spare ones.
+
+    Attributes:
+        state: the robot in the pose, raised limbs' feet off the ground.
+
+    Raises:
+        SpecError: fewer than three feet stand, or a raised limb is none of those that stand in the pose.
     """
 
     robot: Robot
     pose: str = "stand"
+    raised: tuple[str, ...] = ()
     state: State = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "state", self.robot.state(self.pose))
+        put = partial(object.__setattr__, self)
+        put("raised", tuple(name_of(limb, "Walker.raised") for limb in self.raised))
+        put("state", self._lifted(self.robot.state(self.pose)))
         if len(self.legs) < 3:
             raise SpecError(
                 f"robot '{self.robot.name}' has {len(self.legs)} feet in pose '{self.pose}'; "
@@ -119,20 +133,54 @@ class Walker:
 
     @property
     def legs(self) -> tuple[str, ...]:
-        """Limbs that stand in the pose, in the robot's order."""
+        """Limbs that stand, in the robot's order: in the pose, but for raised ones."""
         standing = self.robot.standing_feet(self.state.q)
-        return tuple(limb for limb, foot in self.robot.feet.items() if foot in standing)
+        limbs = self.robot.feet.items()
+        return tuple(limb for limb, foot in limbs if foot in standing and limb not in self.raised)
+
+    def _lifted(self, stands: State) -> State:
+        """The pose with the raised limbs turned up by their second joint."""
+        if not self.raised:
+            return stands
+        standing = self.robot.standing_feet(stands.q)
+        legs = [limb for limb, foot in self.robot.feet.items() if foot in standing]
+        forms = Platform.of_robot(self.robot, stands, legs).legs
+        q = np.array(stands.q)
+        for limb in self.raised:
+            if limb not in forms:
+                known = listing(list(forms))
+                raise SpecError(f"Walker.raised: '{limb}' is no leg of three joints that stands: {known}")
+            form, index = forms[limb], [self.robot.joint_index(joint)[0] for joint in forms[limb].joints]
+            turns = np.concatenate([np.linspace(q[index[1]], end[1], 60) for end in (form.lower, form.upper)])
+            heights = np.array([form.foot([q[index[0]], turn, q[index[2]]])[2] for turn in turns])
+            rises = heights - form.foot(q[index])[2]
+            # The least turn that is enough, else the one that lifts most.
+            far = rises >= min(LIFTED * q[2], rises.max())
+            q[index[1]] = turns[far][np.abs(turns[far] - q[index[1]]).argmin()]
+        return State(self.robot.model, q)
 
     @property
     def ring(self) -> tuple[str, ...]:
         """The same counter-clockwise round the body, the first one at or after the +y axis.
 
+        Where one limb is raised, the first one is next to it.
+
         Of a hexapod with two legs on the x axis the first three are those behind the y axis, as in
         Zhuang's Table 2.
         """
-        at = {leg: self.foot(leg) for leg in self.legs}
-        turned = {leg: (math.atan2(p[1], p[0]) - 0.5 * math.pi) % (2.0 * math.pi) for leg, p in at.items()}
-        return tuple(sorted(turned, key=lambda leg: turned[leg]))
+        return tuple(
+            sorted(self.legs, key=lambda leg: (self._direction(leg) - self._first) % (2.0 * math.pi))
+        )
+
+    @property
+    def _first(self) -> float:
+        """Direction from which legs are counted [rad]."""
+        return self._direction(self.raised[0]) if len(self.raised) == 1 else 0.5 * math.pi
+
+    def _direction(self, limb: str) -> float:
+        """Where a limb's foot is in the pose, seen from the body [rad]."""
+        x, y = self.foot(limb)
+        return math.atan2(y, x)
 
     @property
     def root(self) -> str:
@@ -180,6 +228,7 @@ class Walker:
         radius: float | None = None,
         height: float | None = None,
         angles: Mapping[str, float] | None = None,
+        even: float = 0.0,
     ) -> Stance:
         """Where the feet stand: as in the pose, or on a circle, or with the outer legs turned.
 
@@ -189,12 +238,17 @@ class Walker:
             radius: CR, of the circle that all feet stand on [m], each in its direction.
             height: of the body's origin [m]; the pose's where not given.
             angles: leg -> direction from the body [rad], for feet on the circle.
+            even: share, 0 to 1, by which the feet on the circle close the gap that a raised limb leaves; at 1
+                they stand evenly about it.
 
         Raises:
-            SpecError: both `lean` and a circle are given, or a leg cannot reach its place.
+            SpecError: both `lean` and a circle are given, there is not one gap, or a leg cannot reach its
+                place.
         """
-        if lean is not None and (radius is not None or angles):
-            raise SpecError("stance: give lean, or a circle (radius, angles), not both")
+        if lean is not None and (radius is not None or angles or even):
+            raise SpecError("stance: give lean, or a circle (radius, angles, even), not both")
+        if even:
+            angles = {**self._closing(even), **dict(angles or {})}
         feet = {leg: self.foot(leg) for leg in self.legs}
         if lean is not None:
             feet = {leg: self._leaning(leg, foot, lean) for leg, foot in feet.items()}
@@ -209,6 +263,17 @@ class Walker:
         for leg, foot in stance.feet.items():
             self.require(leg, np.array([*foot, -stance.height]), "its stance")
         return stance
+
+    def _closing(self, share: float) -> dict[str, float]:
+        """Directions of the feet that close the gap of a raised limb by a share [rad]."""
+        share = number(share, "stance: even", "a share of 0 to 1", least=0.0)
+        if len(self.raised) != 1 or share > 1.0:
+            raise SpecError(f"stance: even={share:g} needs one raised limb and a share of 0 to 1")
+        full, found = 2.0 * math.pi, {}
+        for k, leg in enumerate(self.ring):
+            own = (self._direction(leg) - self._first) % full
+            found[leg] = self._first + own + share * (full * (k + 0.5) / len(self.legs) - own)
+        return found
 
     def _leaning(self, leg: str, foot: Array, lean: float) -> Array:
         hip = self.hip(leg)

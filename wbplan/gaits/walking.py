@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.errors import GaitError, SpecError, listing
-from wbplan.gaits.building import Fields, Manner, Walk, build
+from wbplan.gaits.building import USUAL, Fields, Manner, Walk, build
 from wbplan.gaits.gait import Gait
-from wbplan.gaits.library import crawls, gait_named
+from wbplan.gaits.library import crawls, distinct, gait_named, gaits_of, pentapod
 from wbplan.gaits.margins import best_margin
 from wbplan.gaits.schedule import Ground, beats_of, count_for, flat, schedule
-from wbplan.gaits.stance import Stance, Walker
+from wbplan.gaits.stance import Mode, Stance, Walker
 from wbplan.gaits.tracks import Track
 from wbplan.paths import number
 from wbplan.robot import Robot
@@ -32,6 +32,8 @@ CALM = 1.0
 GRAIN = 0.04
 #: Time [s] between the places by which the body's acceleration is found.
 INSTANT = 0.02
+#: Share by which five feet close the gap of the sixth: more leaves less room for strokes, less less margin.
+CLOSING = 0.6
 #: Strides of the walks by which a shorter stride is looked for.
 TRIED = 2.5
 
@@ -78,22 +80,60 @@ def walk(
         )
     stroke = number(stroke, "walk: stroke", "a positive length [m]", above=0.0)
 
-    def planned(share: float, manner: Manner, known: Walk | None = None) -> Walk:
+    def planned(share: float, manner: Manner, known: Walk | None = None, usual: float = USUAL) -> Walk:
         stride = gait.stride(share * stroke)
         course = track if share == 1.0 else Track(min(track.length, TRIED * stride), track.curve)
         beats = beats_of(gait, count_for(gait, course.length, stride))
         speed = stride / (gait.cycle * manner.beat)
         made = schedule(beats, stance, course, manner.beat, ground, place, speed)
-        return build(walker, made, stance, manner, ground, fields, known)
+        return build(walker, made, stance, manner, ground, fields, known, usual)
 
     try:
-        done = planned(1.0, manner)
+        try:
+            done = planned(1.0, manner)
+        except GaitError:
+            if manner.margin is not None:
+                raise
+            done = planned(1.0, manner, usual=0.5 * USUAL)  # with less sway legs may reach
         if manner.step_time is None:
             manner = replace(manner, step_time=_step_time(done, manner))
             done = planned(1.0, manner, done)
     except GaitError as error:
-        raise _with_a_way_out(error, lambda share: planned(share, manner), gait.stride(stroke)) from None
+        still = best_margin(gait, stance.feet, (0.0, 0.0))
+        wider = manner.margin / still if manner.margin is not None and still > 0.0 else 0.0
+        raise _with_a_way_out(
+            error, lambda share: planned(share, manner), gait.stride(stroke), wider
+        ) from None
     return replace(done, gait=gait, stride=done.speed * gait.cycle * manner.beat)
+
+
+def walker_for(robot: Robot, name: str) -> Walker:
+    """A robot's legs for a gait: all; of six, for Zheng's gaits of five, all but one that is held up.
+
+    That one is a limb that can be an arm, where there is one.
+
+    Args:
+        robot: the robot.
+        name: of the gait.
+    """
+    walker = Walker(robot)
+    if len(walker.legs) != 6 or name not in pentapod(tuple("abcde")):
+        return walker
+    arms = [limb for limb in walker.legs if "arm" in robot.roles.get(limb, {})]
+    return Walker(robot, raised=(arms[0] if arms else walker.ring[0],))
+
+
+def gaits_for(robot: Robot, mode: Mode | None = None) -> tuple[str, ...]:
+    """Names of all gaits that a robot may be asked to walk in, each under one name.
+
+    Args:
+        robot: the robot.
+        mode: which way its legs point; the modes are those of six legs.
+    """
+    walker = Walker(robot)
+    names = distinct(gaits_of(walker.ring))
+    five = len(walker.legs) == 6 and (mode is None or mode.lean is None)
+    return (*names, *pentapod(tuple("abcde"))) if five else names
 
 
 def gait_for(walker: Walker, name: str, stance: Stance, heading: float, stroke: float) -> Gait:
@@ -137,8 +177,17 @@ def _step_time(done: Walk, manner: Manner) -> float:
     return GRAIN * math.ceil(least / GRAIN)
 
 
-def _with_a_way_out(error: GaitError, planned: Callable[[float], Walk], stride: float) -> GaitError:
-    """The same error with the longest stride that would hold."""
+def _with_a_way_out(
+    error: GaitError, planned: Callable[[float], Walk], stride: float, wider: float
+) -> GaitError:
+    """The same error with the longest stride that would hold, or the stance.
+
+    Args:
+        error: the error.
+        planned: share of the stride -> the walk.
+        stride: [m].
+        wider: a stance so many times as wide has the margin asked, the body standing still.
+    """
     if error.stride is not None or "step_time" in str(error):
         return error
     low, high = 0.0, 1.0
@@ -154,6 +203,8 @@ def _with_a_way_out(error: GaitError, planned: Callable[[float], Walk], stride: 
     way = (
         f"a stride of {low * stride:.3f} m (of {stride:.3f} m) would hold"
         if low > 0.0
+        else f"no shorter stride would hold; with short ones a stance over {wider:.2f} times as wide would"
+        if wider > 1.0
         else "no shorter stride would hold: widen the stance, ask for less margin, or pause between steps"
     )
     return GaitError(f"{error}; {way}", step=error.step, margin=error.margin, stride=low * stride or None)

@@ -22,8 +22,9 @@ from wbplan.papers import (
     zhuang_gaits,
 )
 from wbplan.papers.rows import DIFFERS, Row
+from wbplan.papers.zheng_switch import figure_16
 
-__all__ = ["DIFFERS", "PAPERS", "Row", "report", "summary"]
+__all__ = ["DIFFERS", "PAPERS", "Row", "figure_16", "report", "summary"]
 
 PAPERS: Mapping[str, tuple[Callable[[], list[Row]], ...]] = {
     "mana": mana.TABLES + mana_motion.TABLES + mana_simulated.TABLES,

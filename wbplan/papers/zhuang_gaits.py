@@ -138,6 +138,10 @@ def modes() -> list[Row]:
             ours = "NC" if share < 1e-6 else "MC" if share > 0.5 else "AC"
             wrong = ours != word
             why = f"its share of the foot's speed is {share:.2f}"
+            if (
+                wrong and name == "mixed2"
+            ):  # the crab's row has sin^2 of the lean, NC at 0 to MC at 60 degrees
+                why += ": cos^2 60 deg, as it is sin^2 60 deg in mixed1; hip and knee make the rest"
             what = f"{name}: abductors of legs {', '.join(leg[-1] for leg in legs)}"
             found.append(row("section 4", what, word, ours, why=why, misprint=wrong and name == "mixed2"))
     return found

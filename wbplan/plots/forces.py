@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbplan.bundle import NO_MARGIN, Bundle
-from wbplan.pictures import blank, write
+from wbplan.pictures import blank, unruffled, write
 from wbplan.plots.overview import BOUND, FAINT, INK
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def save(bundle: Bundle, path: str | Path) -> Path:
     return write(figure(bundle), path)
 
 
+@unruffled()
 def figure(bundle: Bundle) -> Figure:
     """Draw a plan's forces over time.
 

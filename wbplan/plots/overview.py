@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wbplan.bundle import NO_MARGIN, Bundle
 from wbplan.errors import SpecError
 from wbplan.geometry import HalfPlanes, support_polygon
-from wbplan.pictures import blank, write
+from wbplan.pictures import blank, unruffled, write
 from wbplan.plots.measures import draw_measures
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def save(bundle: Bundle, path: str | Path) -> Path:
     return write(figure(bundle), path)
 
 
+@unruffled()
 def figure(bundle: Bundle) -> Figure:
     """Draw a plan; the figure shows itself in a notebook.
 

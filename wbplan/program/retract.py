@@ -84,12 +84,12 @@ class Retraction:
     def _solve(self, lower: Array, upper: Array) -> Array | None:
         """The least step onto the hard rows: by least squares where no bound is in its way."""
         stack = self._stack
+        if not (math.isfinite(stack.A.sum() + stack.C.sum()) and math.isfinite(stack.b.sum())):
+            return None
         lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
         least = np.asarray(np.linalg.lstsq(stack.A, stack.b, rcond=SINGULAR)[0], dtype=np.float64)
         if (lower <= least).all() and (least <= upper).all() and (stack.C @ least <= stack.d).all():
             return least
-        if not (math.isfinite(stack.A.sum() + stack.C.sum()) and math.isfinite(stack.b.sum())):
-            return None
         used = np.flatnonzero(stack.d < UNBOUNDED)
         rows = (stack.A, stack.b, stack.C[used], stack.d[used], lower, upper)
         found = _least(*rows)

@@ -52,6 +52,15 @@ def reach(model: Any, frame: int) -> float:
     return float(sum(np.linalg.norm(link) for link in links))
 
 
+def reaches(model: Any) -> Array:
+    """`reach` [m] of every frame; that of the world, number -1, comes last."""
+    along = np.zeros(model.njoints)
+    for joint in range(2, model.njoints):
+        along[joint] = along[model.parents[joint]] + np.linalg.norm(model.jointPlacements[joint].translation)
+    found = [along[f.parentJoint] + np.linalg.norm(f.placement.translation) for f in model.frames]
+    return np.array([*found, 0.0])
+
+
 def _pairs(targets: Sequence[FrameTarget], slot: dict[int, int]) -> NDArray[np.intp]:
     """(k, 2) where the frame and the root of each target stand among the frames that are read."""
     return np.array([(slot[t.frame], slot[t.root]) for t in targets], dtype=np.intp).reshape(-1, 2)
@@ -256,16 +265,15 @@ class Rows:
 
 def levers(phase: CompiledPhase, rows: Rows, span: slice) -> Array:
     """Bound on the curvature of each row, per unit of its error: lever arm [m], or 1 for a rotation."""
-    model, found = phase.model, []
-    longest = max(reach(model, k) for k in range(len(model.frames)))
+    reach, found = reaches(phase.model), []
     # A base on its feet moves by the legs that it stands on: their length is its lever arm.
     held = (t for t in phase.frame_targets if t.hard)
-    standing = max((reach(model, t.frame) for t in held), default=0.0)
+    standing = max((reach[t.frame] for t in held), default=0.0)
     for target, row in zip(rows.targets_of_rows[span], rows.chosen[span], strict=True):
         if not isinstance(target, FrameTarget):
-            found.append(longest)
+            found.append(reach.max())
         elif row // 3 < len(rows.position_targets):
-            found.append(max(standing, reach(model, target.frame), reach(model, target.root)))
+            found.append(max(standing, reach[target.frame], reach[target.root]))
         else:
             found.append(1.0)
     return np.array(found)

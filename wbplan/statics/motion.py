@@ -91,7 +91,8 @@ def demand(
     """
     data = model.createData()
     count, size = len(q), 3 * len(feet)
-    torque, wrench, com = np.zeros((count, model.nv)), np.zeros((count, 6)), np.zeros((count, 3))
+    torque, com = np.zeros((count, model.nv)), np.zeros((count, 3))
+    turn, place = np.zeros((count, 3, 3)), np.zeros((count, 3))
     base, joints = np.zeros((count, 6, size)), np.zeros((count, size, model.nv - 6))
     for k in range(count):
         torque[k] = pin.rnea(model, data, q[k], v[k], a[k])
@@ -103,8 +104,9 @@ def demand(
             J = pin.getFrameJacobian(model, data, foot, pin.LOCAL_WORLD_ALIGNED)[:3]
             base[k, :, 3 * i : 3 * i + 3] = J[:, :6].T
             joints[k, 3 * i : 3 * i + 3] = J[:, 6:]
-        R, p = data.oMi[1].rotation, data.oMi[1].translation
-        force = R @ torque[k, :3]
-        wrench[k, :3], wrench[k, 3:] = force, R @ torque[k, 3:6] + np.cross(p, force)
+        turn[k], place[k] = data.oMi[1].rotation, data.oMi[1].translation
+    force = np.einsum("kij,kj->ki", turn, torque[:, :3])
+    moment = np.einsum("kij,kj->ki", turn, torque[:, 3:6]) + np.cross(place, force)
+    wrench = np.hstack([force, moment])
     weight = float(pin.computeTotalMass(model)) * float(np.linalg.norm(model.gravity.linear))
     return Demand(torque, base, joints, wrench, com, weight)
