@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import random
 from typing import Any
@@ -94,6 +95,6 @@ def _revalued(rng: random.Random, array: Any) -> Any:
         with np.errstate(all="ignore"):
             array[where] = array[where] * value
     else:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), contextlib.suppress(OverflowError):  # of 32 bits
             array[where] = value
     return array

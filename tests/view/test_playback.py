@@ -99,6 +99,14 @@ def test_a_target_is_shown_only_while_it_is_asked_for(played):
     ]
 
 
+def test_a_target_that_is_absurdly_far_is_not_shown(bundle):
+    motion = bundle.trajectory
+    far = motion.targets["box"].copy()
+    far[-1, :2] = np.finfo(float).max
+    played = Played(dataclasses.replace(bundle, trajectory=dataclasses.replace(motion, targets={"box": far})))
+    assert [played.shown("/wbplan/targets/box", t) for t in (1.05, float(motion.time[-1]))] == [True, False]
+
+
 def test_all_clips_last_as_long_as_the_plan(played):
     assert {clip["clip"]["duration"] for clip in played.clips} == {2.0}
     assert max(track["times"][-1] for track in played.tracks.values()) <= 2.0 + 1e-6

@@ -42,7 +42,7 @@ def _objects(replay: Replay, bounds: Tolerances) -> list[Row]:
     place, turn = Worst("object place", "m"), Worst("object turn", "rad")
     for name, recorded in replay.record.bodies.items():
         path = Poses.of(recorded)
-        known = np.isfinite(np.sum(recorded, axis=1))
+        known = np.isfinite(np.abs(recorded).max(axis=1))
         left: Poses | None = None
         for window in replay.windows:
             item = _carried(window, name)

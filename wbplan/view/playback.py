@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wbplan.errors import SpecError, ViewError
-from wbplan.geometry import support_polygon
+from wbplan.geometry import LARGEST, support_polygon
 from wbplan.view import shapes
 from wbplan.view.collisions import draw_collisions
 from wbplan.view.drawing import DISC_Z, GRADES, Drawing, body_sizes, box_corners, grade, node, pose7
@@ -378,7 +378,7 @@ class _Playback:
 
     def _posed(self, path: str, poses: Array) -> Array:
         """A node at poses (N, 7), hidden where they are not known; returns those that are."""
-        known: Bools = np.isfinite(poses.sum(axis=1))
+        known: Bools = np.abs(poses).max(axis=1) <= LARGEST  # NaN is not
         if known.any():
             held = poses[np.maximum.accumulate(np.where(known, np.arange(len(poses)), int(np.argmax(known))))]
             self._moving(path, held[:, :3], held[:, 3:])
