@@ -33,6 +33,8 @@ SwingMaker = Callable[[Array, Array, float, float], QuinticSwing | CosineSwing]
 
 #: Share of the largest margin that is asked for where none is given.
 USUAL = 0.5
+#: Share of that margin that is planned but not promised: what keeps links apart may push the body aside.
+ASIDE = 0.03
 #: Moments of a swing at which its height over the ground is looked at.
 LOOKS = 61
 
@@ -340,4 +342,4 @@ def _balanced(steps: Sequence[Step], motion: _Motion, manner: Manner, usual: flo
             step=max(worst - 1, 0),
             margin=float(min(largest, common[worst])),
         )
-    return found, margin
+    return found, margin if manner.margin is not None else (1.0 - ASIDE) * margin
