@@ -2,7 +2,7 @@
 
 A limb of five joints lacks one freedom of six: the body makes up for it by a shift across its way. How much a
 task asks for follows in closed form (`FiveJointLimb`); the planner finds the same shift by itself where the
-body is free to go sideways.
+body is free to go sideways, the hand's path being hard, and the rows of the support polygon bound it.
 """
 
 from __future__ import annotations
