@@ -62,7 +62,7 @@ def script(
         lift: how high feet rise [m]; a tenth of the body's height where not given.
         height: of the body [m]; the pose's where not given, unless legs had no room for a stroke then.
         radius: of the circle that the feet stand on [m]; the pose's stance where not given.
-        margin: stability margin kept throughout [m]; nearly half of the largest where not given, or a quarter.
+        margin: stability margin kept throughout [m]; almost half of the largest if not given, or a quarter.
         closing: share by which five feet close the gap of the sixth; at 1 they are a regular pentagon.
         clearance: kept between links, and of all but the feet from the ground [m]; 0 keeps none, nor do
             robots without collision shapes.

@@ -49,7 +49,7 @@ class Manner:
             allow where not given.
         height: how high feet are lifted over the higher end of their way [m].
         clearance: least height of a foot over the ground in the middle half of its way [m].
-        margin: stability margin kept all through [m]; nearly half of the largest where not given (a quarter where
+        margin: stability margin kept all through [m]; almost half the largest if not given (a quarter where
             legs do not reach far enough for the body's sway then).
         friction: of the feet on the ground [-].
         speed: share of the joints' speed limits that may be used.
