@@ -111,7 +111,7 @@ class Clearance:
         self._reserved = model.bound + RESERVE
         self._allowed = np.zeros(len(model.first))
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
-        self._results = [self._data.distanceResults[k] for k in range(solid)]
+        self._results = self._data.distanceResults
         self._nearest = self._results_view() if solid > 1 else None
         self._still: list[tuple[int, float]] | None = None
 

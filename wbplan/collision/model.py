@@ -16,7 +16,7 @@ What does not move in the phase relative to each other is measured once.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, final
 from xml.etree import ElementTree
@@ -167,7 +167,39 @@ def collision_model(compiled: CompiledPhase) -> CollisionModel:
         SpecError: a name of `except_for` is neither a frame nor a body, a mesh has no volume, or the robot
             has no shapes.
     """
-    return _Builder(compiled).build()
+    return _build(_Kind(_what_counts(compiled), compiled))
+
+
+@final
+@dataclass(frozen=True)
+class _Kind:
+    """Phases that have the same collision model: shapes are placed and paired once for all of them."""
+
+    counts: tuple[Any, ...]
+    compiled: CompiledPhase = field(compare=False)
+
+
+def _what_counts(compiled: CompiledPhase) -> tuple[Any, ...]:
+    """All of a phase that its collision model depends on."""
+    phase, frames = compiled.phase, compiled.model.frames
+    return (
+        compiled.robot,
+        tuple(
+            (h.body.name, h.body.size, h.holder, frames[h.frame].placement.homogeneous.tobytes())
+            for h in compiled.held
+        ),
+        tuple((body.name, body.size, pose.homogeneous.tobytes()) for body, pose in compiled.standing),
+        frozenset(d.joint for d in compiled.driven if d.path.constant),
+        tuple(phase.closures),
+        phase.self_collision,
+        id(phase.obstacles),  # the same as long as a phase of this kind is kept
+        frozenset(contact.frame for contact in phase.contacts),
+    )
+
+
+@lru_cache(maxsize=16)
+def _build(kind: _Kind) -> CollisionModel:
+    return _Builder(kind.compiled).build()
 
 
 class _Builder:
@@ -207,10 +239,12 @@ class _Builder:
             self.things += [Thing(item.name, WORLD_JOINT, False, True) for item in self.fields]
             self._against_the_world(moving)
         shapes = len(self.geometry.geometryObjects)
-        self.pairs.sort(key=lambda pair: pair[1] >= shapes)
+        self.pairs.sort(key=lambda pair: (pair[1] >= shapes, pair[0], pair[1]))
+        paired = np.zeros((shapes, shapes), dtype=np.bool_)
         for first, second, *_ in self.pairs:
             if second < shapes:
-                self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+                paired[first, second] = True
+        self.geometry.setCollisionPairs(paired)  # row by row, as they are sorted
         columns: list[Any] = list(zip(*self.pairs, strict=True)) or [[]] * 5
         return CollisionModel(
             self.geometry,
