@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wbplan as wb
-from wbplan.compiled import acceleration
+from wbplan.compiled.phase import acceleration
 from wbplan.program.nullspace import null_basis
 
 BACKENDS = ["proxqp", "placo"]
