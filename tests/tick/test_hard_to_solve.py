@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wbplan as wb
-from wbplan.compiled.phase import acceleration
+from wbplan.compiled.acceleration import acceleration_bounds
 from wbplan.program.nullspace import null_basis
 
 BACKENDS = ["proxqp", "placo"]
@@ -168,7 +168,7 @@ def test_a_joint_that_moves_next_to_nothing_has_a_bound(
     legarm: wb.Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     n = legarm.model.nv - 6
-    monkeypatch.setattr(acceleration, "_own_limbs", lambda robot: np.zeros(n))
-    monkeypatch.setattr(acceleration, "standing_inertia", lambda *_: np.full(n, 1e-310))
-    bounds = acceleration.acceleration_bounds(legarm, wb.Phase("p"), np.array(legarm.state("stand").q))
+    monkeypatch.setattr("wbplan.compiled.acceleration._own_limbs", lambda robot: np.zeros(n))
+    monkeypatch.setattr("wbplan.compiled.acceleration.standing_inertia", lambda *_: np.full(n, 1e-310))
+    bounds = acceleration_bounds(legarm, wb.Phase("p"), np.array(legarm.state("stand").q))
     assert np.isfinite(bounds).all()
