@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wbplan as wb
+from wbplan.compiled.acceleration import acceleration_bounds
 from wbplan.program.nullspace import null_basis
 
 BACKENDS = ["proxqp", "placo"]
@@ -161,3 +162,13 @@ def test_where_no_step_is_left_no_row_narrows_it(capfd: pytest.CaptureFixture[st
     assert null_basis(np.zeros((4, 0))).shape == (0, 0)
     assert null_basis(np.zeros((0, 3))).shape == (3, 3)
     assert not capfd.readouterr().out  # LAPACK complains there about what it cannot take
+
+
+def test_a_joint_that_moves_next_to_nothing_has_a_bound(
+    legarm: wb.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    n = legarm.model.nv - 6
+    monkeypatch.setattr("wbplan.compiled.acceleration._own_limbs", lambda robot: np.zeros(n))
+    monkeypatch.setattr("wbplan.compiled.acceleration.standing_inertia", lambda *_: np.full(n, 1e-310))
+    bounds = acceleration_bounds(legarm, wb.Phase("p"), np.array(legarm.state("stand").q))
+    assert np.isfinite(bounds).all()

@@ -122,7 +122,8 @@ def acceleration_bounds(robot: Robot, phase: Phase, q: Array, model: Any = None)
     inertia = limbs + standing_inertia(model, q, [c.frame for c in phase.contacts])
     bound: Array = speed / RISE
     named = (effort > 0.0) & (inertia > 0.0)
-    bound[named] = np.minimum(bound[named], SHARE * effort[named] / inertia[named])
+    with np.errstate(over="ignore"):  # what next to nothing has to be moved by is no bound
+        bound[named] = np.minimum(bound[named], SHARE * effort[named] / inertia[named])
     limits = phase.joint_limits
     return bound if limits is None else _given(robot, phase, limits.acceleration, bound, "acceleration")
 
