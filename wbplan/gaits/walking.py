@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 
 #: Share of the joints' speed limits that an automatic step time uses.
 PACE = 0.7
-#: Acceleration of a swinging foot [m/s^2] that an automatic step time allows: at twice of it, every other tick
-#: of the small hexapod had no step after which all joints could stop together.
+#: Acceleration of a swinging foot [m/s^2] that an automatic step time allows: at twice of it, every other
+#: tick of the small hexapod had no step after which all joints could stop together.
 GENTLE = 1.2
 #: Acceleration of the centre of mass over the feet [m/s^2] that an automatic step time allows.
 CALM = 1.0
