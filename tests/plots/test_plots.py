@@ -78,7 +78,7 @@ def test_the_file_is_a_picture_and_the_same_each_time(good: Bundle, tmp_path: Pa
 
 def test_a_notebook_gets_a_picture_without_pyplot(drawing: Figure, good: Bundle) -> None:
     legs = [f"leg{k}" for k in range(6)]
-    gait = gaits.cycle_figure([gaits.tripod(legs)], gaits.regular_stance(legs), heading=0.0, stroke=0.1)
+    gait = gaits.cycle_figure([(gaits.tripod(legs), gaits.regular_stance(legs), 0.1)], heading=0.0)
     for other in (force_figure(good), gait):
         assert other._repr_png_().startswith(b"\x89PNG")
     assert drawing._repr_png_().startswith(b"\x89PNG")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ ROLE_TOLERANCE = 1e-6
 """How far [rad or m] a joint may be from where a role holds it."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A checked URDF with what its SRDF (or the caller) adds to it.
 
@@ -41,17 +41,20 @@ class Robot:
 
     name: str
     urdf_path: Path
-    urdf_text: str = field(repr=False)
-    model: pin.Model = field(repr=False)
+    urdf_text: str
+    model: pin.Model
     limbs: Mapping[str, tuple[str, ...]]
     feet: Mapping[str, str]
     hands: Mapping[str, str]
-    poses: Mapping[str, Mapping[str, float]] = field(repr=False)
-    roles: Mapping[str, Mapping[str, Mapping[str, float]]] = field(repr=False)
-    ignored_collisions: frozenset[frozenset[str]] = field(repr=False)
+    poses: Mapping[str, Mapping[str, float]]
+    roles: Mapping[str, Mapping[str, Mapping[str, float]]]
+    ignored_collisions: frozenset[frozenset[str]]
     package_dirs: tuple[Path, ...] = ()
     srdf_path: Path | None = None
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, {self.urdf_path.name!r})"
 
     @property
     def joint_names(self) -> tuple[str, ...]:
